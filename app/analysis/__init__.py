@@ -1,0 +1,1 @@
+"""From trials to measures, statistics, figures and a report."""

@@ -1,0 +1,1 @@
+"""The method, pure: values, belief, assistance. Imports numpy and numba only."""

@@ -1,0 +1,1 @@
+"""Logged trials seen again, and what would have been."""

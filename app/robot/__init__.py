@@ -1,0 +1,1 @@
+"""The simulated arm: physics, kinematics, grasp targets, outcomes."""

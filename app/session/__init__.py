@@ -1,0 +1,1 @@
+"""What one worker runs: trial, loop, viewer drawing, recorder."""

@@ -1,0 +1,1 @@
+"""Studies in the browser: protocol, assignment, survey, storage."""
