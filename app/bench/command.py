@@ -1,0 +1,47 @@
+"""`hindsight bench`: every figure of this machine in one run, as a table or JSON."""
+
+import sys
+from typing import Any
+
+Figures = dict[str, dict[str, Any]]
+
+
+def bench(what: str) -> Figures:
+    """Run the benches; names map to {median, p99, unit}, for "assist" as its own docstring says.
+
+    The browser's latency is left out, with a line saying so, where there is no browser.
+    """
+    if what == "assist":
+        from app.bench.assist import bench_assist
+
+        return bench_assist()
+    from app.bench.latency import bench_latency
+    from app.bench.loop import bench_loop
+    from app.bench.record import bench_record
+    from app.bench.scene import bench_scene
+
+    figures: Figures = {}
+    for part in (bench_loop, bench_record, bench_scene, bench_latency):
+        print(f"{part.__name__.removeprefix('bench_')} …", file=sys.stderr, flush=True)
+        figures |= part()
+    return figures
+
+
+def format_table(figures: Figures) -> str:
+    """The figures as aligned text, one a line."""
+    names = list(figures)
+    columns = list(dict.fromkeys(key for figure in figures.values() for key in figure))
+    rows = [["name", *columns]]
+    rows += [[name, *(_cell(figures[name].get(key, "")) for key in columns)] for name in names]
+    widths = [max(len(row[i]) for row in rows) for i in range(len(columns) + 1)]
+    return "\n".join(
+        "  ".join(
+            cell.ljust(width) if i == 0 else cell.rjust(width)
+            for i, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ).rstrip()
+        for row in rows
+    )
+
+
+def _cell(value: object) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,121 @@
+"""From a pointer event on the stick to the pose in a browser's frame, over loopback.
+
+Inputs are numbered; the worker puts the number of the newest into the hidden frame `/probe`, in
+the same atomic block as the arm's poses; the page looks at it in each animation frame.
+"""
+
+import subprocess
+import sys
+import tempfile
+from typing import Any
+
+import numpy as np
+
+N_MOVES = 150
+BROWSER_NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
+FLAGS = [
+    "--no-sandbox",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+]
+# Notes the sequence number of every input message as it leaves the page.
+WATCH_SOCKET = """
+const send = WebSocket.prototype.send;
+window.sent = [];
+WebSocket.prototype.send = function (data) {
+  if (typeof data === 'string') {
+    const message = JSON.parse(data);
+    if (message.type === 'input') window.sent.push([message.seq, performance.now(), message.right]);
+  }
+  return send.call(this, data);
+};
+"""
+MEASURE = """
+async (moves) => {
+  const frame = () => new Promise(requestAnimationFrame);
+  const stick = document.querySelector('[data-testid="stick-right"]');
+  const box = stick.getBoundingClientRect();
+  const [cx, cy] = [box.x + box.width / 2, box.y + box.height / 2];
+  const point = (kind, x, y) => stick.dispatchEvent(new PointerEvent(kind, {bubbles: true,
+    isPrimary: true, pointerType: 'touch', pointerId: 7, clientX: cx + x, clientY: cy + y,
+    buttons: kind === 'pointerup' ? 0 : 1}));
+  const probe = () => document.querySelector('[data-testid="viewer"]')
+    .contentWindow.__viserMutable?.nodePoseData?.['/probe']?.position?.[0] ?? -1;
+  const latencies = [];
+  point('pointerdown', 0, 0);
+  for (let i = 0; i < moves; i++) {
+    for (let wait = 3 + (i * 7) % 5; wait > 0; wait--) await frame();
+    const start = performance.now();
+    const before = window.sent.length;
+    const angle = i * 2.4;
+    point('pointermove', 20 * Math.cos(angle), 20 * Math.sin(angle));
+    let sequence = null;
+    while (performance.now() - start < 2000) {
+      if (sequence === null && window.sent.length > before) sequence = window.sent[before][0];
+      if (sequence !== null && probe() >= sequence) { latencies.push(performance.now() - start); break; }
+      await frame();
+    }
+  }
+  point('pointerup', 0, 0);
+  return latencies;
+}
+"""
+
+
+def bench_latency() -> dict[str, dict[str, Any]]:
+    """{"latency": {median, p99, unit}} [ms]; empty, with a reason, where no browser is found."""
+    import shutil
+
+    browser = next((path for name in BROWSER_NAMES if (path := shutil.which(name))), None)
+    try:
+        from playwright.sync_api import sync_playwright
+    except ImportError:
+        browser = None
+    if browser is None:
+        print("latency: left out, no Chromium or no playwright here", file=sys.stderr)
+        return {}
+    with tempfile.TemporaryDirectory() as folder:
+        server = subprocess.Popen(
+            [sys.executable, "-u", "-m", "app", "run", "--port", "0", "--sessions", folder],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
+        try:
+            url = _read_address(server)
+            with sync_playwright() as playwright:
+                page = playwright.chromium.launch(executable_path=browser, args=FLAGS).new_page(
+                    viewport={"width": 640, "height": 400}
+                )
+                page.add_init_script(WATCH_SOCKET)
+                page.goto(f"{url}/?method=direct")
+                page.wait_for_selector('[data-testid="connection"][data-state="connected"]')
+                page.wait_for_function(
+                    "document.querySelector('[data-testid=viewer]').contentWindow"
+                    ".__viserMutable?.nodePoseData?.['/probe'] !== undefined",
+                    timeout=60_000,
+                )
+                page.wait_for_timeout(2000)
+                latencies = page.evaluate(MEASURE, N_MOVES)
+        finally:
+            server.terminate()
+            server.wait(30)
+    if len(latencies) < N_MOVES // 2:
+        print(f"latency: only {len(latencies)} of {N_MOVES} moves were seen", file=sys.stderr)
+    median, p99 = np.percentile(latencies, [50, 99])
+    return {"latency": {"median": float(median), "p99": float(p99), "unit": "ms"}}
+
+
+def _read_address(server: "subprocess.Popen[str]") -> str:
+    assert server.stdout is not None
+    for line in server.stdout:
+        for word in line.split():
+            if word.startswith("http://"):
+                return word.rstrip("/.,")
+    raise RuntimeError("the server ended before it named its address")
