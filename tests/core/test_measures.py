@@ -18,7 +18,7 @@ DT = 0.01
 
 
 def make_columns(n: int, **changes: object) -> dict[str, np.ndarray]:
-    """Make n running ticks of a user who pushes half way along x and a hand that follows exactly."""
+    """Make n running ticks: the user pushes half way along x, the hand follows exactly."""
     direct = np.zeros((n, 6))
     direct[:, 0] = 0.1
     columns: dict[str, np.ndarray] = {
