@@ -5,19 +5,7 @@ from contextlib import contextmanager
 
 from playwright.sync_api import Browser, Page, sync_playwright
 
-from tests.find_browser import find_browser
-
-FLAGS = [
-    "--no-sandbox",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--use-gl=angle",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-]
+from app.browser import HEADLESS_FLAGS, find_browser
 
 
 @contextmanager
@@ -26,7 +14,7 @@ def chromium() -> Iterator[Browser]:
     path = find_browser()
     assert path, "no Chromium found: `make browser` installs it or says how"
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=path, args=FLAGS)
+        browser = playwright.chromium.launch(executable_path=path, args=list(HEADLESS_FLAGS))
         try:
             yield browser
         finally:

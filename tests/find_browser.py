@@ -5,15 +5,7 @@ import shutil
 import subprocess
 import sys
 
-NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
-
-
-def find_browser() -> str | None:
-    """Path of an installed Chromium or Chrome, or None; HINDSIGHT_BROWSER goes first."""
-    named = os.environ.get("HINDSIGHT_BROWSER")
-    if named:
-        return named if os.access(named, os.X_OK) else None
-    return next((path for name in NAMES if (path := shutil.which(name))), None)
+from app.browser import find_browser
 
 
 def install_debian_chromium() -> None:

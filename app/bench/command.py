@@ -15,10 +15,11 @@ def bench(what: str) -> Figures:
         from app.bench.assist import bench_assist
 
         return bench_assist()
-    from app.bench.latency import bench_latency
     from app.bench.loop import bench_loop
     from app.bench.record import bench_record
     from app.bench.scene import bench_scene
+
+    from app.bench.latency import bench_latency
 
     figures: Figures = {}
     for part in (bench_loop, bench_record, bench_scene, bench_latency):

@@ -11,19 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from app.browser import HEADLESS_FLAGS, find_browser
+
 N_MOVES = 150
-BROWSER_NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
-FLAGS = [
-    "--no-sandbox",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--use-gl=angle",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-]
 # Notes the sequence number of every input message as it leaves the page.
 WATCH_SOCKET = """
 const send = WebSocket.prototype.send;
@@ -58,7 +48,10 @@ async (moves) => {
     let sequence = null;
     while (performance.now() - start < 2000) {
       if (sequence === null && window.sent.length > before) sequence = window.sent[before][0];
-      if (sequence !== null && probe() >= sequence) { latencies.push(performance.now() - start); break; }
+      if (sequence !== null && probe() >= sequence) {
+        latencies.push(performance.now() - start);
+        break;
+      }
       await frame();
     }
   }
@@ -70,9 +63,7 @@ async (moves) => {
 
 def bench_latency() -> dict[str, dict[str, Any]]:
     """{"latency": {median, p99, unit}} [ms]; empty, with a reason, where no browser is found."""
-    import shutil
-
-    browser = next((path for name in BROWSER_NAMES if (path := shutil.which(name))), None)
+    browser = find_browser()
     try:
         from playwright.sync_api import sync_playwright
     except ImportError:
@@ -90,9 +81,9 @@ def bench_latency() -> dict[str, dict[str, Any]]:
         try:
             url = _read_address(server)
             with sync_playwright() as playwright:
-                page = playwright.chromium.launch(executable_path=browser, args=FLAGS).new_page(
-                    viewport={"width": 640, "height": 400}
-                )
+                page = playwright.chromium.launch(
+                    executable_path=browser, args=list(HEADLESS_FLAGS)
+                ).new_page(viewport={"width": 640, "height": 400})
                 page.add_init_script(WATCH_SOCKET)
                 page.goto(f"{url}/?method=direct")
                 page.wait_for_selector('[data-testid="connection"][data-state="connected"]')
