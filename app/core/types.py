@@ -7,6 +7,8 @@ import numpy as np
 import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
+Rows = npt.NDArray[np.int64]
+"""Row numbers of targets."""
 
 Mode = Literal["translate", "rotate"]
 """What the sticks command: the hand's position, or its orientation."""
