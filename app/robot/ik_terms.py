@@ -1,0 +1,92 @@
+# pyright: reportMissingImports=false
+"""Our two terms of Pink's quadratic program: the commanded twist, and limits on the motion."""
+
+import numpy as np
+import pinocchio as pin
+from pink import Configuration
+from pink.limits import Limit
+from pink.tasks import Task
+
+from app.core.types import Array
+
+BRAKING_SHARE = 0.7
+"""Part of the acceleration limit the braking distance counts on; below 1 as time is discrete."""
+
+
+class TwistTask(Task):
+    """Make the hand move by a given small displacement: e = −[v; ω] dt, J Δq = −e.
+
+    Axes are those of the world, the point is the hand's: what a twist of the contract means.
+    Position errors count in metres, rotation errors in units of 0.3 m/rad.
+    """
+
+    def __init__(self, frame: str) -> None:
+        super().__init__(cost=np.array([1.0, 1.0, 1.0, 0.3, 0.3, 0.3]))
+        self.frame = frame
+        self._displacement = np.zeros(6)
+
+    def __repr__(self) -> str:  # pyright: ignore[reportIncompatibleMethodOverride]
+        return f"TwistTask(frame={self.frame!r}, cost={self.cost})"
+
+    def set_displacement(self, displacement: Array) -> None:
+        """Twist times dt [m, rad], shape (6,)."""
+        self._displacement = displacement
+
+    def compute_error(self, configuration: Configuration) -> Array:
+        """−displacement, shape (6,)."""
+        return -self._displacement
+
+    def compute_jacobian(self, configuration: Configuration) -> Array:
+        """World-aligned Jacobian of the hand, shape (6, 7)."""
+        return pin.getFrameJacobian(
+            configuration.model,
+            configuration.data,
+            configuration.model.getFrameId(self.frame),
+            pin.ReferenceFrame.LOCAL_WORLD_ALIGNED,
+        )
+
+
+class MotionLimit(Limit):
+    """Joint positions with room to brake, and joint acceleration, as one box that is never empty.
+
+    For the upper side (the lower is its mirror), with d = q_max − q:
+        q̇ ≤ q̇_prev + a dt,  q̇ ≤ √(2 · 0.7 a · d),  q̇ ≤ d / dt.
+    Where these leave nothing, the position limit wins over the acceleration. Pink's own
+    AccelerationLimit has no such order and makes the program infeasible there; without any
+    acceleration bound, joints jump by 60–280 rad/s² near a singularity.
+    """
+
+    def __init__(self, limit: Array, velocity: Array, acceleration: Array) -> None:
+        self._limit = limit
+        self._velocity = velocity
+        self._acceleration = acceleration
+        self._q = np.zeros_like(limit)
+        self._previous = np.zeros_like(limit)
+        eye = np.eye(len(limit))
+        self._matrix = np.vstack([eye, -eye])
+
+    def set_state(self, q: Array, previous: Array) -> None:
+        """Joint positions [rad] and velocities of the tick before [rad/s], shape (7,) each."""
+        self._q = q
+        self._previous = previous
+
+    def bounds(self, dt: float) -> tuple[Array, Array]:
+        """Lowest and highest q̇ [rad/s] of this tick, shape (7,) each."""
+        room_up, room_down = self._limit - self._q, self._q + self._limit
+        top = self._reachable(room_up, dt)
+        bottom = -self._reachable(room_down, dt)
+        high = np.clip(self._previous + self._acceleration * dt, bottom, top)
+        low = np.clip(self._previous - self._acceleration * dt, bottom, top)
+        return low, high
+
+    def _reachable(self, room: Array, dt: float) -> Array:
+        room = np.maximum(room, 0.0)
+        braking = np.sqrt(2.0 * BRAKING_SHARE * self._acceleration * room)
+        return np.minimum(np.minimum(braking, room / dt), self._velocity)
+
+    def compute_qp_inequalities(
+        self, configuration: Configuration, dt: float
+    ) -> tuple[Array, Array]:
+        """G Δq ≤ h of the box."""
+        low, high = self.bounds(dt)
+        return self._matrix, np.concatenate([high, -low]) * dt
