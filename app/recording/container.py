@@ -4,6 +4,7 @@ Nothing here touches a disk: `TrialEncoder` fills a buffer, from which `sink.Fil
 it can write.
 """
 
+import math
 from collections.abc import Iterator
 from typing import IO, Any
 
@@ -69,21 +70,19 @@ class TrialEncoder:
             )
             self._channels[record] = self._writer.register_channel(f"/{record}", "json", schema_id)
 
-    def add(self, record: str, message: msgspec.Struct | bytes, wall_s: float, number: int) -> int:
+    def add(self, record: str, message: msgspec.Struct | bytes, time_ns: int, number: int) -> int:
         """Append one message.
 
         Args:
             record: "trial", "step", "event" or "summary".
             message: The struct, or its JSON.
-            wall_s: Unix time [s], by which viewers place the message.
+            time_ns: Unix time, by which viewers place the message.
             number: Sequence number of the message within its topic.
 
         Returns:
             How many numbers in it were not finite: they have become null.
         """
         data = message if isinstance(message, bytes) else encode(message)
-        # The container's clock is unsigned; a clock before 1970 is a broken clock.
-        time_ns = max(0, round(wall_s * 1e9)) if wall_s == wall_s else 0
         self._writer.add_message(self._channels[record], time_ns, data, time_ns, number)
         return sum(data.count(mark) for mark in _NULLS) if record == "step" else 0
 
@@ -95,6 +94,11 @@ class TrialEncoder:
         """End the file: the index record for lists of trials, then MCAP's own summary."""
         self._writer.add_metadata(INDEX_RECORD, index)
         self._writer.finish()
+
+
+def to_ns(wall_s: float) -> int:
+    """Unix time [s] as the container wants it: whole nanoseconds, not before 1970."""
+    return max(0, round(wall_s * 1e9)) if math.isfinite(wall_s) else 0
 
 
 def scan(file: IO[bytes]) -> Iterator[tuple[str, int, int, bytes]]:

@@ -9,3 +9,7 @@ class RecordingError(AppError):
 
 class MessageError(RecordingError):
     """One message of a log cannot be used; whoever knows the file adds its name."""
+
+
+class NewerFormatError(MessageError):
+    """The log is sound, but a newer program wrote it."""

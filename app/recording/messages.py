@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 import msgspec
 
-from app.recording.errors import MessageError
+from app.recording.errors import MessageError, NewerFormatError
 from app.recording.fields import RECORDS, element_type, fields
 from app.recording.schema import TrialHeader
 
@@ -74,11 +74,12 @@ def decode_header(data: bytes) -> TrialHeader:
     """The header of a log, refused where a newer program wrote it.
 
     Raises:
-        MessageError: If the version is newer than this program's, or the message is bad.
+        NewerFormatError: If the version is newer than this program's.
+        MessageError: If the message is bad.
     """
     version = decode(_Version, data).schema_version
     if version > SCHEMA_VERSION:
-        raise MessageError(
+        raise NewerFormatError(
             f"written in record format {version}; this program reads up to {SCHEMA_VERSION}: "
             "update Hindsight"
         )

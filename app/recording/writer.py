@@ -15,7 +15,7 @@ from pathlib import Path
 import msgspec
 
 from app.recording.cache import derive_cache
-from app.recording.container import TrialEncoder
+from app.recording.container import TrialEncoder, to_ns
 from app.recording.entry import index_of
 from app.recording.schema import StepRecord, TrialEvent, TrialHeader, TrialSummary
 from app.recording.sink import FileSink
@@ -154,11 +154,13 @@ class TrialWriter:
         while self._queue and len(self._encoder.buffer.waiting) < BUFFER_LIMIT:
             message = self._queue.popleft()
             if isinstance(message, TrialEvent):
-                self._encoder.add("event", message, message.wall_s, self._events)
+                self._encoder.add("event", message, to_ns(message.wall_s), self._events)
                 self._events += 1
                 continue
             try:
-                bad = self._encoder.add("step", message, message.wall_s, self._summaries.steps)
+                bad = self._encoder.add(
+                    "step", message, to_ns(message.wall_s), self._summaries.steps
+                )
             except (TypeError, ValueError) as error:
                 self._defect = f"step {message.step} cannot be recorded: {error}"
                 continue
@@ -187,7 +189,7 @@ class TrialWriter:
         self._sink.open()
         if self._sink.number != self.header.trial:
             self.header = msgspec.structs.replace(self.header, trial=self._sink.number)
-        self._encoder.add("trial", self.header, self.header.started_wall_s, 0)
+        self._encoder.add("trial", self.header, to_ns(self.header.started_wall_s), 0)
         self._encode()
 
     def _complete(self) -> bool:
@@ -197,7 +199,7 @@ class TrialWriter:
             return False
         if not self._ended:
             summary = self._summary or self._summaries.interrupted()
-            self._encoder.add("summary", summary, summary.ended_wall_s, 0)
+            self._encoder.add("summary", summary, to_ns(summary.ended_wall_s), 0)
             self._encoder.finish(index_of(self.header, summary))
             self._ended = True
         if not self._flush():
