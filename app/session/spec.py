@@ -3,12 +3,13 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 from app.errors import AppError
 
-StartRule = Literal["auto", "signal"]
-"""auto: the arm is released 0.5 s after the trial is made. signal: the command `start` does it."""
+StartRule = Literal["auto", "input", "signal"]
+"""What releases the arm. auto: 0.5 s have passed since the trial was made. input: the first push.
+signal: the command `start`."""
 
 START_DELAY_S = 0.5
 """How long a live trial holds the arm, so that its first picture is still [s]."""
@@ -55,7 +56,8 @@ class SessionOptions:
         method: Method of the first trial; empty: the settings' own.
         target: Instructed goal of the first trial; empty: random order of all objects.
         start: When the arm is released.
-        timeout_s: A running trial ends with outcome "timeout" after this long; 0: never [s].
+        timeout_s: A running trial ends with outcome "timeout" after this long; 0: never; None:
+            the scene's own limit [s].
         viewer_hz: Most viewer updates a second.
         status_hz: Most status messages a second.
         theme: "dark" or "light".
@@ -74,7 +76,7 @@ class SessionOptions:
     method: str = ""
     target: str = ""
     start: StartRule = "auto"
-    timeout_s: float = 0.0
+    timeout_s: float | None = None
     viewer_hz: float = 60.0
     status_hz: float = 30.0
     theme: str = "dark"
@@ -101,12 +103,14 @@ def parse_options(options: Mapping[str, Any]) -> SessionOptions:
     for name in options:
         if name not in known:
             raise SpecError(f"option {name!r} is unknown; valid: {', '.join(known)}")
-    values = {k: tuple(v) if isinstance(v, list) else v for k, v in options.items()}
+    values: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in options.items()}
     parsed = SessionOptions(**values)
-    _check("start", parsed.start, parsed.start in ("auto", "signal"), "auto or signal")
+    _check("start", parsed.start, parsed.start in get_args(StartRule), "auto, input or signal")
     _check("theme", parsed.theme, parsed.theme in ("dark", "light"), "dark or light")
     for name, low, high in (("viewer_hz", 1, 100), ("status_hz", 1, 60), ("timeout_s", 0, 3600)):
         value = getattr(parsed, name)
+        if name == "timeout_s" and value is None:
+            continue
         number = isinstance(value, (int, float)) and math.isfinite(value)
         _check(name, value, number and low <= value <= high, f"a number from {low} to {high}")
     seed = parsed.seed
