@@ -1,0 +1,83 @@
+/**
+ * The picture: viser's client in an iframe of our own origin. The page reads its camera to place the
+ * tags and to know which way "away" is; it draws nothing in there.
+ */
+
+/** Column-major 4×4, as three.js keeps it in `Matrix4.elements`. */
+function apply(m, [x, y, z, w]) {
+  return [0, 1, 2, 3].map((i) => m[i] * x + m[i + 4] * y + m[i + 8] * z + m[i + 12] * w);
+}
+
+export class Viewer {
+  /** @param {HTMLIFrameElement} frame */
+  constructor(frame) {
+    this.frame = frame;
+    this.path = "";
+  }
+
+  /** @param {string} path the session's viewer, as `hello` names it */
+  open(path) {
+    if (path === this.path || !/^\/[^/\\]/.test(path)) return;
+    this.path = path;
+    this.frame.src = `${path}?hideViserLogo`;
+  }
+
+  /** Fetch the picture anew, for one whose robot was replaced. */
+  reload() {
+    this.frame.src = this.frame.src;
+  }
+
+  get window() {
+    return this.frame.contentWindow;
+  }
+
+  get #scene() {
+    try {
+      return /** @type {any} */ (this.window)?.__viserMutable;
+    } catch {
+      return undefined; // an error page of the browser is not of our origin
+    }
+  }
+
+  get #camera() {
+    const camera = this.#scene?.camera;
+    return camera?.matrixWorld?.elements && camera.matrixWorldInverse?.elements && camera.projectionMatrix?.elements ? camera : null;
+  }
+
+  /** Whether the camera can be read, and with it tags be drawn. */
+  get ready() {
+    return this.#camera !== null;
+  }
+
+  /**
+   * Heading about world z of what is up in the picture [rad]; null while there is no picture.
+   * viser shows world (x, y, z) as three.js (−y, z, −x).
+   */
+  yaw() {
+    const camera = this.#camera;
+    if (!camera) return null;
+    const m = camera.matrixWorld.elements;
+    // Forward and up of the camera share their heading where it looks down; the sum also has one
+    // where it looks along the table or straight at it.
+    const x = m[10] - m[6];
+    const y = m[8] - m[4];
+    return Math.hypot(x, y) > 1e-6 ? Math.atan2(y, x) : null;
+  }
+
+  /**
+   * Where a scene node stands in the picture.
+   * @param {string} name
+   * @returns {[number, number]|null} pixels from the top left; null where it is not to be seen
+   */
+  project(name) {
+    const camera = this.#camera;
+    const node = this.#scene?.nodeRefFromName?.[name]?.matrixWorld?.elements;
+    if (!camera || !node) return null;
+    const seen = apply(camera.matrixWorldInverse.elements, [node[12], node[13], node[14], 1]);
+    const [x, y, , w] = apply(camera.projectionMatrix.elements, seen);
+    if (!(w > 0)) return null;
+    const { clientWidth, clientHeight } = this.frame;
+    const [left, top] = [((x / w + 1) / 2) * clientWidth, ((1 - y / w) / 2) * clientHeight];
+    return left >= 0 && left <= clientWidth && top >= 0 && top <= clientHeight ? [left, top] : null;
+  }
+}
