@@ -95,10 +95,7 @@ class Assistant:
         Raises:
             CommandError: Naming the setting, its value and what is valid; nothing is changed.
         """
-        try:
-            self._set(settings_from_dict(changes, self.settings))
-        except CoreError as error:
-            raise CommandError(str(error)) from None
+        self._set(change_settings(self.settings, changes))
 
     def change_method(self, method: str) -> None:
         """Switch the method, and what it brings along.
@@ -106,8 +103,6 @@ class Assistant:
         Raises:
             CommandError: If there is no such method.
         """
-        if method not in METHODS:
-            raise CommandError(f"method is {method!r}; valid: {', '.join(METHODS)}")
         self.change(method_changes(self.settings, method, self._preset))
 
     def _set(self, settings: AssistanceSettings) -> None:
@@ -120,7 +115,12 @@ def method_changes(settings: AssistanceSettings, method: str, preset: str) -> di
 
     Under the default preset a method's own defaults come and go with it, except in fields that
     somebody has changed.
+
+    Raises:
+        CommandError: If there is no such method.
     """
+    if method not in METHODS:
+        raise CommandError(f"method is {method!r}; valid: {', '.join(METHODS)}")
     changes: dict[str, Any] = {"method": method}
     if preset != "default":
         return changes
@@ -132,3 +132,15 @@ def method_changes(settings: AssistanceSettings, method: str, preset: str) -> di
         if changes.get(name, getattr(settings, name)) == getattr(plain, name):
             changes[name] = value
     return changes
+
+
+def change_settings(settings: AssistanceSettings, changes: Mapping[str, Any]) -> AssistanceSettings:
+    """The settings with some changed by name.
+
+    Raises:
+        CommandError: Naming the setting, its value and what is valid.
+    """
+    try:
+        return settings_from_dict(changes, settings)
+    except CoreError as error:
+        raise CommandError(str(error)) from None

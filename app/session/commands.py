@@ -1,7 +1,6 @@
-"""Discrete commands: checked once at the edge, then queued and never lost."""
+"""Discrete commands: checked once at the edge, then carried out in order."""
 
 import math
-from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -110,23 +109,3 @@ def parse_command(message: Mapping[str, Any]) -> Command:
             raise CommandError(f"{name} needs {key}: {rule.wanted}")
     number = message.get("id", 0)
     return Command(name, args, str(message.get("client", "")), number if type(number) is int else 0)
-
-
-class CommandQueue:
-    """First in, first out, between the reader's thread and the loop's; nothing is dropped."""
-
-    def __init__(self) -> None:
-        self._waiting: deque[Command] = deque()  # append and popleft are atomic
-
-    def put(self, command: Command) -> None:
-        """Queue a command from any thread."""
-        self._waiting.append(command)
-
-    def take(self) -> list[Command]:
-        """Everything that waits, oldest first."""
-        taken: list[Command] = []
-        while True:
-            try:
-                taken.append(self._waiting.popleft())
-            except IndexError:
-                return taken

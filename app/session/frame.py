@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from app.core.types import Array
+from app.core import AssistanceSettings, Goals
 from app.recording.schema import StepRecord
 from app.session.loop import Health
 
@@ -21,7 +21,6 @@ class TrialView:
         seed: Of the layout.
         goal_names: In the order of the record's belief.
         object_names: In the order of the record's object_poses.
-        target_offsets: First row of each goal in the flat list of targets, and the end.
         settings: All settings by name.
     """
 
@@ -32,7 +31,6 @@ class TrialView:
     seed: int
     goal_names: tuple[str, ...]
     object_names: tuple[str, ...]
-    target_offsets: tuple[int, ...]
     settings: Mapping[str, Any]
 
 
@@ -41,8 +39,9 @@ class Frame(NamedTuple):
 
     record: StepRecord
     view: TrialView
-    target_positions: Array
-    """Targets in the world frame [m], (n_targets, 3)."""
+    goals: Goals
+    """Targets in the world frame."""
+    settings: AssistanceSettings
     seconds: float
     """Time as measured: stands still from the command that closes the hand."""
     outcome: str

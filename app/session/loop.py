@@ -40,6 +40,7 @@ class HealthMeter:
         self.ticks = 0
         self.skipped = 0
         self.late = 0
+        self._health = Health()
 
     def add(self, beat: Beat) -> None:
         """Count one beat and the slots lost before it."""
@@ -50,37 +51,40 @@ class HealthMeter:
         self.late += beat.skipped + (beat.lateness_s > LATE_SHARE * self._period)
 
     def health(self) -> Health:
-        """The figures now."""
-        if len(self._times) < 2:
-            return Health()
-        span = self._times[-1] - self._times[0]
-        return Health(
-            hz=(len(self._times) - 1) / span if span > 0 else 0.0,
-            late=self.late,
-            lateness_ms=1000 * statistics.median(self._lateness),
-            kept=self.ticks / (self.ticks + self.skipped),
-        )
+        """The figures, at most 10 ticks old."""
+        if self.ticks % 10 == 0 and len(self._times) > 1:
+            span = self._times[-1] - self._times[0]
+            self._health = Health(
+                hz=(len(self._times) - 1) / span if span > 0 else 0.0,
+                late=self.late,
+                lateness_ms=1000 * statistics.median(self._lateness),
+                kept=self.ticks / (self.ticks + self.skipped),
+            )
+        return self._health
 
 
 class Loop:
     """Calls a tick at every beat until it is told to stop."""
 
-    def __init__(self, pacer: Pacer, meter: HealthMeter, tick: Callable[[Beat], None]) -> None:
+    def __init__(
+        self,
+        pacer: Pacer,
+        meter: HealthMeter,
+        tick: Callable[[Beat], None],
+        ended: Callable[[], bool],
+    ) -> None:
         """Prepare; nothing runs before `run`.
 
         Args:
             pacer: When.
             meter: Told every beat.
             tick: What; may not block.
+            ended: Asked at every beat whether to stop.
         """
         self._pacer = pacer
         self._meter = meter
         self._tick = tick
-        self._stopping = False
-
-    def stop(self) -> None:
-        """End after the tick that runs; from any thread, and from a signal handler."""
-        self._stopping = True
+        self._ended = ended
 
     def run(self) -> None:
         """Tick until stopped; an exception of a tick ends the loop and is passed on.
@@ -91,9 +95,9 @@ class Loop:
         gc.collect()
         gc.freeze()
         self._pacer.restart()
-        while not self._stopping:
+        while not self._ended():
             beat = self._pacer.wait()
-            if self._stopping:
+            if self._ended():
                 return
             self._meter.add(beat)
             self._tick(beat)

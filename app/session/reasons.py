@@ -12,12 +12,11 @@ counts as distance too. Parts are summed over the last half second of change.
 """
 
 import math
-from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
 from app.core.types import Array
+from app.core.values import cost_rate, translation_cost
 from app.session.frame import Frame
 
 MEMORY_S = 0.5
@@ -82,15 +81,15 @@ def evidence_parts(frame: Frame, belief: Array) -> tuple[Array, Array]:
         frame: The tick.
         belief: b(g), the weights of the mean that goals are compared with, shape (n_goals,).
     """
-    settings = frame.view.settings
+    settings = frame.settings
     distances, cosines = _distances(frame), _cosines(frame)
-    cost = _cost_rate(distances, settings)
-    slopes = cost / float(settings.get("translation_speed", 1.0))
+    cost = cost_rate(distances, translation_cost(settings))
+    slopes = cost / settings.translation_speed
     speed = math.hypot(*frame.record.direct_twist[:3])
     mean_slope, mean_cosine = float(belief @ slopes), float(belief @ cosines)
     direction = 0.5 * speed * (slopes + mean_slope) * (cosines - mean_cosine)
     distance = 0.5 * speed * (cosines + mean_cosine) * (slopes - mean_slope)
-    if settings.get("predictor") == "paper":
+    if settings.predictor == "paper":
         distance = distance - (cost - float(belief @ cost))
     return direction, distance
 
@@ -98,7 +97,7 @@ def evidence_parts(frame: Frame, belief: Array) -> tuple[Array, Array]:
 def _way(frame: Frame) -> Array:
     """From the hand to the target that each goal would be grasped at [m], (n_goals, 3)."""
     hand = np.array(frame.record.hand_position_m)
-    return frame.target_positions[frame.record.best_targets] - hand
+    return frame.goals.positions[frame.record.best_targets] - hand
 
 
 def _distances(frame: Frame) -> Array:
@@ -110,11 +109,3 @@ def _cosines(frame: Frame) -> Array:
     push = np.array(frame.record.direct_twist[:3])
     norms = np.linalg.norm(way, axis=1) * np.linalg.norm(push)
     return np.divide(way @ push, norms, out=np.zeros(len(way)), where=norms > 1e-12)
-
-
-def _cost_rate(distance: Array, settings: Mapping[str, Any]) -> Array:
-    """C(d) = α min(1, d/δ) + c₀ [nat/s]."""
-    delta = float(settings.get("translation_delta", 0.07))
-    alpha = float(settings.get("translation_alpha", 2.25))
-    offset = float(settings.get("translation_offset", 0.0))
-    return alpha * np.minimum(1.0, distance / delta) + offset

@@ -5,24 +5,16 @@ from pathlib import Path
 from app.recording.numbering import reserve_trial
 from app.recording.schema import StepRecord, TrialEvent, TrialHeader, TrialSummary
 from app.recording.writer import TrialWriter
-from app.session.spec import WorkerSpec
-
-
-def session_folder(spec: WorkerSpec) -> Path:
-    """Where a session's logs go."""
-    subject = spec.participant or spec.id
-    root = Path(spec.sessions) / spec.study / "data" / "raw"
-    return root / f"subject-{subject}" / f"session-{spec.session}"
 
 
 class Recorder:
     """Hands records to the running trial's log; nothing of it waits for the disk."""
 
     def __init__(self, folder: Path | None) -> None:
-        """Prepare the folder.
+        """Prepare.
 
         Args:
-            folder: The session's folder; None: nothing is recorded.
+            folder: The session's open folder; None: nothing is recorded.
 
         Raises:
             RecordingError: If the folder cannot be written.
@@ -32,7 +24,6 @@ class Recorder:
         self._writer: TrialWriter | None = None
         self._finishing: list[TrialWriter] = []
         if folder is not None:
-            folder.mkdir(parents=True, exist_ok=True)
             self._next = reserve_trial(folder)
 
     @property
@@ -62,6 +53,11 @@ class Recorder:
             for event in events:
                 self._writer.write_event(event)
             self._writer.write(record)
+
+    def write_event(self, event: TrialEvent) -> None:
+        """Record an event between ticks."""
+        if self._writer is not None:
+            self._writer.write_event(event)
 
     def finish(self, summary: TrialSummary | None) -> None:
         """End the trial's log without waiting."""

@@ -18,6 +18,7 @@ import numpy as np
 
 from app.core import (
     AssistanceSettings,
+    Goals,
     UserInput,
     compute_command,
     compute_input,
@@ -253,6 +254,11 @@ class Trial:
     def settings(self) -> AssistanceSettings:
         """As they are now."""
         return self._assistant.settings
+
+    @property
+    def goals(self) -> Goals:
+        """The targets in the world frame, where the objects are now."""
+        return self.world.goals()
 
     @property
     def tick(self) -> int:

@@ -104,8 +104,8 @@ class InputGate:
         self._connected = False
         self._received = None
 
-    def accept(self, message: Mapping[str, Any], now_s: float) -> None:
-        """Take one input message.
+    def accept(self, message: Mapping[str, Any], now_s: float) -> bool:
+        """Take one input message; returns whether it differs from what counted before.
 
         Args:
             message: The browser's `input` message with `client`.
@@ -115,12 +115,12 @@ class InputGate:
             InputError: If it is malformed, stale, replayed or not from the client in control.
         """
         try:
-            self._accept(message, now_s)
+            return self._accept(message, now_s)
         except InputError:
             self.refused += 1
             raise
 
-    def _accept(self, message: Mapping[str, Any], now_s: float) -> None:
+    def _accept(self, message: Mapping[str, Any], now_s: float) -> bool:
         client = str(message.get("client", ""))
         if client != self._control:
             raise InputError(f"input from {client!r}, but {self._control!r} has control")
@@ -142,8 +142,11 @@ class InputGate:
             raise InputError("the page's clock was stepped; learning its offset")
         if excess > QUEUED_S:
             raise InputError(f"input waited {excess:.2f} s; valid: at most {QUEUED_S} s")
-        if not self._blocked:
-            self._received = Received(user_input, now_s)
+        before = self._received
+        if self._blocked:
+            return False
+        self._received = Received(user_input, now_s)
+        return before is None or before.user_input.axes != user_input.axes
 
     def current(self, now_s: float) -> tuple[UserInput, Loss]:
         """The input that counts now, and why it is zero where it was lost."""
