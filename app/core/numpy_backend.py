@@ -11,7 +11,7 @@ from app.core.values import translation_cost, value
 
 __all__ = ["NAME", "evaluate", "fill_grid", "update"]
 
-NAME = "numpy"
+NAME: str = "numpy"
 
 
 def update(
