@@ -1,0 +1,109 @@
+"""Where the operator looks from: presets, fitted to the panel's shape."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import viser
+
+from app.errors import AppError
+
+Preset = Literal["operator", "side", "top"]
+PRESETS: tuple[Preset, ...] = ("operator", "side", "top")
+RESET = "reset"
+"""Back to the preset that was chosen last."""
+
+
+class CameraError(AppError):
+    """A camera preset that does not exist."""
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """One camera: where it stands and looks in the world [m], and its vertical angle [degrees]."""
+
+    position: tuple[float, float, float]
+    look_at: tuple[float, float, float]
+    fov_degrees: float
+
+
+OPERATOR_BY_ASPECT: tuple[tuple[float, View], ...] = (
+    (0.75, View((-0.42, -1.42, 1.18), (0.47, -0.04, 0.05), 40.0)),
+    (4 / 3, View((-0.42, -1.30, 1.10), (0.395, -0.02, 0.085), 38.0)),
+    (1.6, View((-0.36, -1.14, 0.98), (0.45, -0.03, 0.09), 38.0)),
+)
+"""The operator stands to the robot's right: from behind, the arm hides the objects."""
+SIDE = View((0.45, -1.75, 0.5), (0.42, 0.0, 0.16), 36.0)
+TOP = View((0.415, 0.0, 2.1), (0.42, 0.0, 0.0), 36.0)
+"""y is equal in both points: otherwise the picture rolls."""
+FITTED_ASPECT = 4 / 3
+"""Side and top are framed for this width to height; narrower panels see them from further away."""
+
+
+def view_for(preset: str, aspect: float) -> View:
+    """The camera of a preset for a panel of this width divided by height.
+
+    Raises:
+        CameraError: If there is no such preset.
+    """
+    if preset == "operator":
+        aspects = [a for a, _ in OPERATOR_BY_ASPECT]
+
+        def between(values: list[float]) -> float:
+            return float(np.interp(aspect, aspects, values))
+
+        views = [view for _, view in OPERATOR_BY_ASPECT]
+        x, y, z = (between([v.position[i] for v in views]) for i in range(3))
+        at_x, at_y, at_z = (between([v.look_at[i] for v in views]) for i in range(3))
+        return View((x, y, z), (at_x, at_y, at_z), between([v.fov_degrees for v in views]))
+    if preset not in PRESETS:
+        raise CameraError(
+            f"camera {preset!r} does not exist; valid are: {', '.join((*PRESETS, RESET))}"
+        )
+    view = SIDE if preset == "side" else TOP
+    away = max(1.0, FITTED_ASPECT / aspect)
+    eye, target = np.asarray(view.position), np.asarray(view.look_at)
+    x, y, z = (target + away * (eye - target)).tolist()
+    return View((x, y, z), view.look_at, view.fov_degrees)
+
+
+class Cameras:
+    """Puts the cameras of all connected browsers where a preset says, and of those to come."""
+
+    def __init__(self, server: viser.ViserServer, preset: Preset = "operator"):
+        self._server = server
+        self.preset: str = preset
+        server.on_client_connect(self._arrived)
+        self._set_initial()
+
+    def set(self, preset: str) -> None:
+        """Move every browser's camera to a preset, or with "reset" back to the chosen one.
+
+        Raises:
+            CameraError: If there is no such preset.
+        """
+        wanted = self.preset if preset == RESET else preset
+        view_for(wanted, 1.0)
+        self.preset = wanted
+        self._set_initial()
+        for client in self._server.get_clients().values():
+            self._place(client)
+
+    def _set_initial(self) -> None:
+        """A first view for the moment before a browser has told its shape."""
+        view, camera = view_for(self.preset, 1.6), self._server.initial_camera
+        camera.position, camera.look_at = view.position, view.look_at
+        camera.fov = float(np.radians(view.fov_degrees))
+
+    def _arrived(self, client: viser.ClientHandle) -> None:
+        self._place(client)
+
+    def _place(self, client: viser.ClientHandle) -> None:
+        camera = client.camera
+        view = view_for(self.preset, float(camera.aspect))
+        with client.atomic():
+            camera.fov = float(np.radians(view.fov_degrees))
+            camera.position = view.position
+            camera.look_at = view.look_at
+            camera.up_direction = (0.0, 0.0, 1.0)
+        client.flush()
