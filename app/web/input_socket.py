@@ -12,7 +12,7 @@ from app.web.config import ServerConfig
 from app.web.limits import QuietLog, TokenBucket
 from app.web.messages import (
     BrowserMessage,
-    EventMessage,
+    Command,
     InputMessage,
     MessageError,
     PingMessage,
@@ -154,12 +154,15 @@ class _Reader:
                 self._last_seq = message.seq
                 session.worker.send_latest("input", _addressed(message, client))
         elif not controls:
-            if not isinstance(message, EventMessage):
-                raise MessageError("this page only watches; another one controls", message.id)
-        else:
-            sent = session.worker.send(_addressed(message, client))
-            if not sent and not isinstance(message, EventMessage):
-                raise MessageError("the simulation takes no commands at present", message.id)
+            self._refuse(message, "this page only watches; another one controls")
+        elif not session.worker.send(_addressed(message, client)):
+            self._refuse(message, "the simulation takes no commands at present")
+
+    def _refuse(self, message: BrowserMessage, text: str) -> None:
+        """Answer a well-formed command that cannot be passed on."""
+        if isinstance(message, Command):
+            answer = {"type": "ack", "id": message.id, "error": text}
+            self._client.outbox.put(to_json(answer))
 
 
 def _addressed(message: BrowserMessage, client: Client) -> dict[str, object]:

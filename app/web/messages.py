@@ -1,6 +1,6 @@
 """What a browser may say on its input socket, checked field by field."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
@@ -61,18 +61,20 @@ class PingMessage(_Strict):
     rtt: Annotated[float, Field(ge=0, le=1e9)] | None = None
 
 
-class _Command(_Strict):
+class Command(_Strict):
+    """Something to be done once; answered by an `ack` with the same id."""
+
     type: Literal["command"]
     id: Sequence
 
 
-class PlainCommand(_Command):
+class PlainCommand(Command):
     """A command without arguments."""
 
     name: Literal["start", "grasp", "open", "hold"]
 
 
-class NewTrialCommand(_Command):
+class NewTrialCommand(Command):
     """Begin a new trial; what is missing is the server's choice."""
 
     name: Literal["new-trial"]
@@ -82,42 +84,42 @@ class NewTrialCommand(_Command):
     scene: Name | None = None
 
 
-class MethodCommand(_Command):
+class MethodCommand(Command):
     """Switch the assistance method."""
 
     name: Literal["method"]
     method: Name
 
 
-class AssistCommand(_Command):
+class AssistCommand(Command):
     """Assistance on or off."""
 
     name: Literal["assist"]
     enabled: bool
 
 
-class ChangesCommand(_Command):
+class ChangesCommand(Command):
     """Change settings of the method, or layers of the view."""
 
     name: Literal["settings", "layers"]
     changes: Changes
 
 
-class CameraCommand(_Command):
+class CameraCommand(Command):
     """Go to a camera preset."""
 
     name: Literal["camera"]
     preset: Name
 
 
-class ThemeCommand(_Command):
+class ThemeCommand(Command):
     """Draw in the page's theme."""
 
     name: Literal["theme"]
     theme: Literal["dark", "light"]
 
 
-Command = Annotated[
+_AnyCommand = Annotated[
     PlainCommand
     | NewTrialCommand
     | MethodCommand
@@ -129,8 +131,8 @@ Command = Annotated[
 ]
 BrowserMessage = InputMessage | EventMessage | PingMessage | Command
 
-_ADAPTER: TypeAdapter[Any] = TypeAdapter(
-    Annotated[InputMessage | EventMessage | PingMessage | Command, Field(discriminator="type")]
+_ADAPTER: TypeAdapter[BrowserMessage] = TypeAdapter(
+    Annotated[InputMessage | EventMessage | PingMessage | _AnyCommand, Field(discriminator="type")]
 )
 
 
@@ -159,9 +161,10 @@ def parse_message(text: str) -> BrowserMessage:
 def _explain(error: ValidationError) -> str:
     """One sentence on the first complaint."""
     first = error.errors(include_url=False)[0]
-    tags = {"input", "event", "ping", "command", *_COMMAND_NAMES}
-    path = [str(part) for part in first["loc"] if part not in tags]
-    name = ".".join(path) or "message"
+    path = first["loc"][2 if first["loc"][:1] == ("command",) else 1 :]
+    name = ".".join(map(str, path)) or "message"
+    if first["type"] == "missing":
+        return f"{name} is missing"
     value = repr(first["input"])
     value = value if len(value) <= 80 else value[:77] + "…"
     return f"{name} is {value}; {first['msg'][0].lower()}{first['msg'][1:]}"
@@ -172,18 +175,3 @@ def _command_id(text: str) -> int | None:
         return _Numbered.model_validate_json(text).id
     except ValidationError:
         return None
-
-
-_COMMAND_NAMES = (
-    "start",
-    "grasp",
-    "open",
-    "hold",
-    "new-trial",
-    "method",
-    "assist",
-    "settings",
-    "layers",
-    "camera",
-    "theme",
-)

@@ -50,7 +50,7 @@ def create_app(
         finally:
             await registry.close()
 
-    return Starlette(
+    application = Starlette(
         routes=[
             Route("/", pages.index),
             Route("/api/health", pages.health),
@@ -64,3 +64,5 @@ def create_app(
         middleware=[Middleware(HostGuard, config=config)],
         lifespan=lifespan,
     )
+    application.state.registry = registry
+    return application

@@ -13,11 +13,13 @@ from typing import Any
 import httpx
 import pytest
 import uvicorn
+from starlette.applications import Starlette
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
 from app.web.config import ServerConfig
 from app.web.run import bind, server_settings
+from app.web.sessions import SessionRegistry
 from app.web.viewer_page import subprotocol
 
 WAIT_S = 30.0
@@ -100,6 +102,7 @@ class Browser:
         options = {"origin": self.server.url, "additional_headers": headers, **options}
         url = self.server.url.replace("http://", "ws://") + path
         quiet: dict[str, Any] = {"compression": None, "max_size": None, "proxy": None}
+        quiet["close_timeout"] = 0.5  # a test leaves much unread
         socket = connect(url, **quiet, **options)
         self.stack.callback(socket.close)
         return socket
@@ -127,8 +130,9 @@ class Server:
     """The web process under test."""
 
     url: str
-    app: Any
+    app: Starlette
     stack: contextlib.ExitStack
+    stop: Callable[[], None]
 
     def browser(self) -> Browser:
         """A browser of its own; closed with the test."""
@@ -136,6 +140,17 @@ class Server:
         browser = Browser(self, http)
         self.stack.callback(browser.stack.close)
         return browser
+
+    @property
+    def registry(self) -> SessionRegistry:
+        """The sessions inside the process."""
+        return self.app.state.registry
+
+    def pid_of(self, session_id: str) -> int:
+        """Process of a session's worker."""
+        session = self.registry.by_id(session_id)
+        assert session and session.worker
+        return session.worker.pid
 
     def health(self) -> dict[str, Any]:
         """What the health report says."""
@@ -163,6 +178,7 @@ def start_server(tmp_path: Path) -> Iterator[StartServer]:
             config = replace(base, **changes)
             listener = stack.enter_context(bind(config))
             settings = server_settings(config)
+            application: Any = settings.app
             server = uvicorn.Server(settings)
             thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]})
             thread.start()
@@ -175,7 +191,7 @@ def start_server(tmp_path: Path) -> Iterator[StartServer]:
             wait_until(lambda: server.started or not thread.is_alive())
             assert server.started
             port = listener.getsockname()[1]
-            return Server(f"http://127.0.0.1:{port}", settings.loaded_app, stack)
+            return Server(f"http://127.0.0.1:{port}", application, stack, stop)
 
         yield start
 

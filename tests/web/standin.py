@@ -21,8 +21,15 @@ def main(spec: WorkerSpec, sock: socket.socket) -> None:
     server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
     server.scene.add_box("/hindsight/box", dimensions=(0.1, 0.1, 0.1))
     lock = threading.Lock()
-    state: dict[str, Any] = {"input": None, "inputs": 0, "clients": None, "events": [], "rtt": None}
-    state |= {"cameras": 0, "session": spec.session}
+    state: dict[str, Any] = {"input": None, "inputs": 0, "events": [], "rtt": None, "cameras": 0}
+    state |= {"clients": {"control": None, "count": 0}, "session": spec.session}
+
+    state["shared"] = 0
+
+    def note_share(**_: Any) -> None:
+        state["shared"] += 1
+
+    server.request_share_url = note_share  # type: ignore[method-assign]
 
     @server.on_client_connect
     def _(client: viser.ClientHandle) -> None:
