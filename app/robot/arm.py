@@ -14,8 +14,15 @@ N_CTRL = N_JOINTS + 1
 HAND_SITE = "ee"
 
 HOME_DEGREES = (0.0, 15.0, 0.0, 130.0, 0.0, -55.0, 0.0)
-LIMIT_DEGREES = tuple(np.degrees([6.2832, 2.24, 6.2832, 2.57, 6.2832, 2.09, 6.2832]).tolist())
-"""|q| of each joint [degrees], as in arm.xml."""
+LOW_DEGREES = (-360.0, -128.3, -360.0, 20.0, -360.0, -119.7, -360.0)
+HIGH_DEGREES = (360.0, 128.3, 360.0, 147.2, 360.0, 119.7, 360.0)
+"""Limits in operation [degrees], inside those of arm.xml.
+
+The elbow (joint 4) never straightens: it costs 1 cm of reach, and the arm cannot be caught in the
+singularity there, from which no pull straight back would bring it home.
+"""
+JOINT_LOW = np.radians(np.array(LOW_DEGREES))  # [rad]
+JOINT_HIGH = np.radians(np.array(HIGH_DEGREES))  # [rad]
 
 MAX_VELOCITY = np.array([1.39, 1.39, 1.39, 1.39, 1.22, 1.22, 1.22])  # [rad/s], published
 MAX_ACCELERATION = np.array([5.2, 5.2, 5.2, 5.2, 10.0, 10.0, 10.0])  # [rad/s²], published

@@ -12,33 +12,45 @@ from app.core.types import Array
 BRAKING_SHARE = 0.7
 """Part of the acceleration limit the braking distance counts on; below 1 as time is discrete."""
 
+UNITS = np.array([1.0, 1.0, 1.0, 0.3, 0.3, 0.3])  # [1, 1, 1, m/rad …]
+STRAIGHTNESS = 10.0
+
 
 class TwistTask(Task):
-    """Make the hand move by a given small displacement: e = −[v; ω] dt, J Δq = −e.
+    """Make the hand move by a given small displacement: S (J Δq − [v; ω] dt) → 0.
 
     Axes are those of the world, the point is the hand's: what a twist of the contract means.
-    Position errors count in metres, rotation errors in units of 0.3 m/rad.
+    S counts rotation in units of 0.3 m/rad, and what leads off the commanded line STRAIGHTNESS
+    times as much as what is missing along it: at the end of its reach the arm slows down on the
+    line instead of sliding away from it.
     """
 
     def __init__(self, frame: str) -> None:
-        super().__init__(cost=np.array([1.0, 1.0, 1.0, 0.3, 0.3, 0.3]))
+        super().__init__(cost=1.0)
         self.frame = frame
         self._displacement = np.zeros(6)
+        self._weight = STRAIGHTNESS * np.diag(UNITS)
 
     def __repr__(self) -> str:  # pyright: ignore[reportIncompatibleMethodOverride]
-        return f"TwistTask(frame={self.frame!r}, cost={self.cost})"
+        return f"TwistTask(frame={self.frame!r})"
 
     def set_displacement(self, displacement: Array) -> None:
         """Twist times dt [m, rad], shape (6,)."""
         self._displacement = displacement
+        line = UNITS * displacement
+        length = np.sqrt(line @ line)
+        self._weight = STRAIGHTNESS * np.diag(UNITS)
+        if length > 0.0:
+            line = line / length
+            self._weight += np.outer((1.0 - STRAIGHTNESS) * line, line * UNITS)
 
     def compute_error(self, configuration: Configuration) -> Array:
-        """−displacement, shape (6,)."""
-        return -self._displacement
+        """−S · displacement, shape (6,)."""
+        return -self._weight @ self._displacement
 
     def compute_jacobian(self, configuration: Configuration) -> Array:
-        """World-aligned Jacobian of the hand, shape (6, 7)."""
-        return pin.getFrameJacobian(
+        """S times the world-aligned Jacobian of the hand, shape (6, 7)."""
+        return self._weight @ pin.getFrameJacobian(
             configuration.model,
             configuration.data,
             configuration.model.getFrameId(self.frame),
@@ -56,13 +68,13 @@ class MotionLimit(Limit):
     acceleration bound, joints jump by 60–280 rad/s² near a singularity.
     """
 
-    def __init__(self, limit: Array, velocity: Array, acceleration: Array) -> None:
-        self._limit = limit
+    def __init__(self, low: Array, high: Array, velocity: Array, acceleration: Array) -> None:
+        self._low, self._high = low, high
         self._velocity = velocity
         self._acceleration = acceleration
-        self._q = np.zeros_like(limit)
-        self._previous = np.zeros_like(limit)
-        eye = np.eye(len(limit))
+        self._q = np.zeros_like(low)
+        self._previous = np.zeros_like(low)
+        eye = np.eye(len(low))
         self._matrix = np.vstack([eye, -eye])
 
     def set_state(self, q: Array, previous: Array) -> None:
@@ -72,7 +84,7 @@ class MotionLimit(Limit):
 
     def bounds(self, dt: float) -> tuple[Array, Array]:
         """Lowest and highest q̇ [rad/s] of this tick, shape (7,) each."""
-        room_up, room_down = self._limit - self._q, self._q + self._limit
+        room_up, room_down = self._high - self._q, self._q - self._low
         top = self._reachable(room_up, dt)
         bottom = -self._reachable(room_down, dt)
         high = np.clip(self._previous + self._acceleration * dt, bottom, top)

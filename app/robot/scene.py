@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from app.core.types import Array
-from app.robot.arm import APERTURE, HOME_DEGREES, LIMIT_DEGREES, N_JOINTS
+from app.robot.arm import APERTURE, HIGH_DEGREES, HOME_DEGREES, LOW_DEGREES, N_JOINTS
 from app.robot.errors import SceneError
 from app.robot.objects import Block, Box, Name, ObjectSpec, Strict, footprint_radius
 
@@ -116,10 +116,12 @@ class Scene(Strict):
 def _problems(scene: Scene) -> Iterator[FieldProblem]:
     """What is wrong between fields, each with the way to the field at fault."""
     yield from _repeated_names(scene)
-    for i, (angle, limit) in enumerate(zip(scene.start_degrees, LIMIT_DEGREES, strict=True)):
-        if abs(angle) > limit:
+    limits = zip(scene.start_degrees, LOW_DEGREES, HIGH_DEGREES, strict=True)
+    for i, (angle, low, high) in enumerate(limits):
+        if not low <= angle <= high:
             yield FieldProblem(
-                ("start_degrees", i), f"{angle:g} is beyond joint {i + 1}; valid: ±{limit:.1f}"
+                ("start_degrees", i),
+                f"{angle:g} is beyond joint {i + 1}; valid: {low:g} to {high:g}",
             )
     if len(scene.places) < len(scene.objects):
         yield FieldProblem(

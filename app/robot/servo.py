@@ -3,13 +3,12 @@
 import numpy as np
 
 from app.core.types import Array
-from app.robot.arm import LIMIT_DEGREES, N_JOINTS
+from app.robot.arm import JOINT_HIGH, JOINT_LOW, N_JOINTS
 
 KP = np.array([2000.0, 2000, 2000, 2000, 800, 800, 800])  # [N m/rad], as in arm.xml
 KV = np.array([100.0, 100, 100, 100, 30, 30, 30])  # [N m s/rad]
 DAMPING = np.array([1.0, 1, 1, 1, 0.5, 0.5, 0.5])  # [N m s/rad] of the joints themselves
 LEASH = 0.02  # [rad]
-_LIMIT = np.radians(np.array(LIMIT_DEGREES))
 
 
 class Servo:
@@ -45,7 +44,7 @@ class Servo:
             ctrl of the seven joint servos [rad], shape (7,).
         """
         ahead = np.clip(self.reference - joint_positions, -LEASH, LEASH)
-        reference = np.clip(joint_positions + ahead + dt * joint_velocities, -_LIMIT, _LIMIT)
+        reference = np.clip(joint_positions + ahead + dt * joint_velocities, JOINT_LOW, JOINT_HIGH)
         self.reference = reference
         self.velocity = np.array(joint_velocities, dtype=np.float64)
         return reference + (KV + DAMPING) / KP * self.velocity
