@@ -10,6 +10,7 @@ import os
 import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -18,7 +19,8 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from app.recording.columns import STEP_TYPES, Column, Columns, TrialLog, no_pause
+from app.recording.arrow import from_table, to_table
+from app.recording.columns import STEP_TYPES, Column, TrialLog, no_pause
 from app.recording.log_file import read_log, state_of
 from app.recording.numbering import CACHE
 from app.recording.schema import TrialEvent, TrialHeader, TrialSummary
@@ -73,28 +75,16 @@ def write_cache(trial: TrialLog) -> None:
     _write_table(to_table(trial.steps, stored), cache_path(trial.path))
 
 
-def to_table(columns: Columns, metadata: dict[bytes, bytes] | None = None) -> pa.Table:
-    """Columns as an Arrow table; lists become fixed-size lists, empty ones are left out."""
-    arrays = {name: _to_arrow(column) for name, column in columns.items() if column.size}
-    arrays |= {n: _to_arrow(c) for n, c in columns.items() if c.ndim == 1 and not c.size}
-    table = pa.table({name: arrays[name] for name in columns if name in arrays})
-    return table.replace_schema_metadata(metadata)
-
-
-def _to_arrow(column: Column) -> pa.Array:
-    if column.dtype.kind == "U":
-        return pa.array(column.tolist(), pa.string()).dictionary_encode()
-    if column.ndim == 1:
-        return pa.array(column)
-    return pa.FixedSizeListArray.from_arrays(pa.array(column.reshape(-1)), column.shape[1])
-
-
 def _write_table(table: pa.Table, path: Path) -> None:
     """Write beside the target, then rename: a reader meets the old cache or the new one."""
     fd, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     try:
         with os.fdopen(fd, "wb") as file:
-            pq.write_table(table, file, compression="zstd")
+            # Measured numbers hardly repeat: a dictionary of them costs more than it saves.
+            text: Any = [f.name for f in table.schema if pa.types.is_dictionary(f.type)]
+            pq.write_table(
+                table, file, compression="zstd", use_dictionary=text, write_statistics=False
+            )
         os.chmod(name, 0o644)
         os.replace(name, path)
     except BaseException:
@@ -126,25 +116,23 @@ def load_cache(log: Path, columns: Sequence[str] | None = None) -> TrialLog | No
             ):
                 return None
             names = list(about.columns if columns is None else columns)
-            table = file.read([n for n in names if n in file.schema_arrow.names])
-            n_steps = file.metadata.num_rows
+            # The step's number comes along: it tells how many rows there are.
+            stored_names = {n for n in names if n in file.schema_arrow.names} | {"step"}
+            table = file.read(list(stored_names))
     except (OSError, pa.ArrowException, msgspec.MsgspecError):
         return None
     return TrialLog(
         path=log,
         log_state=log_state,
         header=about.header,
-        steps={name: _from_arrow(name, table, about, n_steps) for name in names},
+        steps={name: _column(name, table, about) for name in names},
         events=tuple(about.events),
         summary=about.summary,
     )
 
 
-def _from_arrow(name: str, table: pa.Table, about: _About, n_steps: int) -> Column:
-    width = about.widths.get(name)
+def _column(name: str, table: pa.Table, about: _About) -> Column:
+    kind = about.columns[name]
     if name not in table.column_names:
-        return np.empty((n_steps, width or 0), dtype=about.columns[name])
-    array = table[name].combine_chunks()
-    if width is None:
-        return array.to_numpy(zero_copy_only=False).astype(about.columns[name], copy=False)
-    return array.flatten().to_numpy().reshape(n_steps, width)
+        return np.empty((table.num_rows, about.widths.get(name, 0)), dtype=kind)
+    return from_table(table, name).astype(kind, copy=False)

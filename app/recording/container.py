@@ -97,8 +97,8 @@ class TrialEncoder:
 
 
 def to_ns(wall_s: float) -> int:
-    """Unix time [s] as the container wants it: whole nanoseconds, not before 1970."""
-    return max(0, round(wall_s * 1e9)) if math.isfinite(wall_s) else 0
+    """Unix time [s] as the container wants it: whole nanoseconds, unsigned 64 bits."""
+    return min(max(0, round(wall_s * 1e9)), 2**63) if math.isfinite(wall_s) else 0
 
 
 def scan(file: IO[bytes]) -> Iterator[tuple[str, int, int, bytes]]:

@@ -9,11 +9,11 @@ import msgspec
 from app.recording.container import scan
 from app.recording.entry import TrialEntry, make_entry, read_entry
 from app.recording.errors import RecordingError
+from app.recording.folders import RAW_PATTERN
 from app.recording.locks import is_locked
 from app.recording.messages import decode_header
 from app.recording.numbering import FINISHED, UNFINISHED
 from app.recording.schema import TrialHeader
-from app.recording.store import RAW_PATTERN
 
 
 def list_trials(root: Path | str, study: str | None = None) -> list[TrialEntry]:
@@ -124,6 +124,6 @@ def _row(entry: TrialEntry) -> tuple[str, ...]:
     )
 
 
-def trials_json(entries: Iterable[TrialEntry]) -> str:
+def trials_to_json(entries: Iterable[TrialEntry]) -> str:
     """The same as JSON: a list of objects with the fields of TrialEntry."""
     return msgspec.json.format(msgspec.json.encode(list(entries))).decode()

@@ -18,12 +18,12 @@ from app.recording.cache import derive_cache
 from app.recording.container import TrialEncoder, scan, to_ns
 from app.recording.entry import index_of
 from app.recording.errors import NewerFormatError, RecordingError
+from app.recording.folders import RAW_PATTERN, append_event
 from app.recording.locks import folder_lock, try_lock
 from app.recording.log_file import readable
 from app.recording.messages import decode, decode_header
 from app.recording.numbering import FINISHED, UNFINISHED
 from app.recording.schema import StepRecord, TrialHeader, TrialSummary
-from app.recording.store import RAW_PATTERN, append_event
 from app.recording.summarize import SummaryBuilder
 
 TORN_BYTES = 64 * 1024

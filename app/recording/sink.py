@@ -81,7 +81,10 @@ class FileSink:
         source, target = trial_name(self.number, UNFINISHED), trial_name(self.number, FINISHED)
         os.rename(source, target, src_dir_fd=self._folder_fd, dst_dir_fd=self._folder_fd)
         os.fsync(self._folder_fd)
-        return self.folder / target
+        path = self.folder / target
+        if path.exists():
+            return path
+        return Path(os.readlink(f"/proc/self/fd/{self._folder_fd}")) / target  # it was renamed
 
     def close(self) -> None:
         """Release file, lock and folder; the file stays as it is."""

@@ -18,8 +18,8 @@ class SummaryBuilder:
     def add(self, step: StepRecord) -> None:
         """Take one more step into account."""
         self.steps += 1
-        # A tick that begins a whole period late has cost the arm a tick of motion.
-        self.late_steps += step.lateness_s >= self._header.control_dt_s
+        # Late as a trial's own summary counts it: by more than half a period.
+        self.late_steps += step.lateness_s > self._header.control_dt_s / 2
         if step.phase in _BEFORE_CLOSING or self._grasping is None:
             self._grasping = step
         self._last = step

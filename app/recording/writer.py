@@ -153,22 +153,23 @@ class TrialWriter:
             return
         while self._queue and len(self._encoder.buffer.waiting) < BUFFER_LIMIT:
             message = self._queue.popleft()
-            if isinstance(message, TrialEvent):
-                self._encoder.add("event", message, to_ns(message.wall_s), self._events)
-                self._events += 1
-                continue
             try:
-                bad = self._encoder.add(
-                    "step", message, to_ns(message.wall_s), self._summaries.steps
-                )
-            except (TypeError, ValueError) as error:
+                self._add(message)
+            except Exception as error:  # a message that cannot be encoded costs only itself
                 self._defect = f"step {message.step} cannot be recorded: {error}"
-                continue
-            self._summaries.add(message)
-            if bad and self._defect is None:
-                self._defect = f"step {message.step} holds {bad} numbers that are not finite"
         if self.lost_steps:
             self._defect = f"{self.lost_steps} steps are lost: the disk refused for too long"
+
+    def _add(self, message: StepRecord | TrialEvent) -> None:
+        time_ns = to_ns(message.wall_s)
+        if isinstance(message, TrialEvent):
+            self._encoder.add("event", message, time_ns, self._events)
+            self._events += 1
+            return
+        bad = self._encoder.add("step", message, time_ns, self._summaries.steps)
+        self._summaries.add(message)
+        if bad and self._defect is None:
+            self._defect = f"step {message.step} holds {bad} numbers that are not finite"
 
     def _flush(self) -> bool:
         """Bring everything so far to the disk; False (and `error`) where it refuses."""
@@ -220,4 +221,4 @@ class TrialWriter:
 
 def _breathe() -> None:
     """Let the control loop have the interpreter while the cache is derived beside it."""
-    time.sleep(0.0005)
+    time.sleep(0.001)
