@@ -30,7 +30,6 @@ class Head(msgspec.Struct, frozen=True):
     viewer_port: int = 0
     pid: int = 0
     hello: dict[str, Any] | None = None
-    reason: str = ""
 
 
 class Channel:
