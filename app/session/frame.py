@@ -21,6 +21,7 @@ class TrialView:
         seed: Of the layout.
         goal_names: In the order of the record's belief.
         object_names: In the order of the record's object_poses.
+        object_heights_m: Of each object, standing [m].
         settings: All settings by name.
     """
 
@@ -31,6 +32,7 @@ class TrialView:
     seed: int
     goal_names: tuple[str, ...]
     object_names: tuple[str, ...]
+    object_heights_m: tuple[float, ...]
     settings: Mapping[str, Any]
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from app.core import Goals, Pose
 from app.core.types import Array
-from app.robot.arm import JOINT_NAMES
+from app.robot.arm import JOINT_NAMES, N_CTRL
 from app.robot.hand import HandController
 from app.robot.kinematics import Kinematics
 from app.robot.layouts import random_layout
@@ -48,7 +48,6 @@ class PhysicsWorld:
         self._tracker = GoalTracker(scene)
         self._hand = HandController()
         self._monitor = OutcomeMonitor(scene, scene.object_names[0])
-        self._ctrl = self.simulation.data.ctrl.copy()
         self.reset(seed)
 
     @property
@@ -71,6 +70,7 @@ class PhysicsWorld:
         self._tracker.reset()
         self._hand = HandController()
         self._ctrl = self.simulation.data.ctrl.copy()
+        self._look()
 
     def begin(self, instructed: str) -> None:
         """Watch for the outcome of a trial with this goal, the hand open."""
@@ -83,11 +83,11 @@ class PhysicsWorld:
 
     def hand_pose(self) -> Pose:
         """Pose of the site `ee` in the world frame."""
-        return self.simulation.hand_pose()
+        return self._pose
 
     def goals(self) -> Goals:
         """The targets in the world frame, where the objects are now."""
-        return self._tracker.goals(self.simulation.object_poses())
+        return self._tracker.goals(self._object_poses)
 
     def close_hand(self) -> None:
         """Let the hand close, and lift what it holds, by itself."""
@@ -101,12 +101,14 @@ class PhysicsWorld:
         """Move for one control tick."""
         command = self._hand.command()
         taken = twist if command.twist is None else command.twist
-        servo, simulation = self._servo, self.simulation
+        servo = self._servo
         velocity = self._kinematics.solve(servo.reference, servo.velocity, taken, CONTROL_DT)
-        self._ctrl = np.append(
-            servo.advance(simulation.joint_positions, velocity, CONTROL_DT), command.finger_ctrl
-        )
-        simulation.step(self._ctrl)
+        ctrl = np.empty(N_CTRL)
+        ctrl[:-1] = servo.advance(self._joint_positions, velocity, CONTROL_DT)
+        ctrl[-1] = command.finger_ctrl
+        self._ctrl = ctrl
+        self.simulation.step(ctrl)
+        self._look()
         return taken
 
     def judge(self) -> Verdict:
@@ -117,11 +119,16 @@ class PhysicsWorld:
 
     def snapshot(self) -> Snapshot:
         """The state after the tick."""
-        simulation = self.simulation
         return Snapshot(
-            joint_positions=simulation.joint_positions.tolist(),
-            joint_velocities=simulation.joint_velocities.tolist(),
-            finger_positions=simulation.finger_positions.tolist(),
+            joint_positions=self._joint_positions.tolist(),
+            joint_velocities=self.simulation.joint_velocities.tolist(),
+            finger_positions=self.simulation.finger_positions.tolist(),
             ctrl=self._ctrl.tolist(),
-            object_poses=simulation.object_poses().ravel().tolist(),
+            object_poses=self._object_poses.ravel().tolist(),
         )
+
+    def _look(self) -> None:
+        """Read once a tick what several ask for."""
+        self._pose = self.simulation.hand_pose()
+        self._joint_positions = self.simulation.joint_positions
+        self._object_poses = self.simulation.object_poses()

@@ -7,6 +7,7 @@ from typing import Any
 
 from app.core import AssistanceSettings, settings_to_dict
 from app.errors import AppError
+from app.robot.objects import object_height
 from app.robot.scene import Scene
 from app.robot.scene_file import list_scenes, load_scene
 from app.session.assistant import change_settings, method_changes
@@ -291,5 +292,6 @@ class Session:
             seed=trial.seed,
             goal_names=self.scene.object_names,
             object_names=self.scene.object_names,
+            object_heights_m=tuple(object_height(item) for item in self.scene.objects),
             settings=settings_to_dict(trial.settings),
         )

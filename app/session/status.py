@@ -27,6 +27,19 @@ def assist_stick(record: StepRecord, settings: Mapping[str, Any]) -> dict[str, l
     return {"left": [x / full for x in left], "right": [x / full for x in right]}
 
 
+def object_centres(frame: Frame) -> dict[str, list[float]]:
+    """Where a person sees each object [m]: the middle of its height, not the footprint's centre."""
+    centres = {}
+    poses = np.reshape(frame.record.object_poses, (-1, 7)).tolist()
+    for name, height, pose in zip(
+        frame.view.object_names, frame.view.object_heights_m, poses, strict=True
+    ):
+        x, y, z, qw, qx, qy, qz = pose
+        up = (2 * (qx * qz + qw * qy), 2 * (qy * qz - qw * qx), 1 - 2 * (qx * qx + qy * qy))
+        centres[name] = [p + 0.5 * height * u for p, u in zip((x, y, z), up, strict=True)]
+    return centres
+
+
 def status_message(
     frame: Frame,
     *,
@@ -48,8 +61,6 @@ def status_message(
     """
     record, view, health = frame.record, frame.view, frame.health
     leading = int(np.argmax(record.belief))
-    poses = np.reshape(record.object_poses, (-1, 7))
-    objects = {name: pose[:3].tolist() for name, pose in zip(view.object_names, poses, strict=True)}
     trial: Message = {
         "number": view.number,
         "target": view.target,
@@ -69,7 +80,7 @@ def status_message(
         "belief": dict(zip(view.goal_names, record.belief, strict=True)),
         "hand": record.hand_position_m,
         "hand_quaternion": record.hand_quaternion,
-        "objects": objects,
+        "objects": object_centres(frame),
         "direct": record.direct_twist,
         "assistance": record.assistance_twist,
         "executed": record.executed_twist,

@@ -10,6 +10,7 @@ Live sessions, simulated users, replay and tests step it alike. Whoever owns a c
 ticks; the trial itself counts them.
 """
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -21,7 +22,6 @@ from app.core import (
     Goals,
     UserInput,
     compute_command,
-    compute_input,
     settings_to_dict,
 )
 from app.core.types import Array
@@ -148,7 +148,7 @@ class Trial:
         for command in commands:
             self.command(command)
         direct = compute_command(user_input, self.settings)
-        pushed = float(np.linalg.norm(compute_input(user_input)))
+        pushed = _input_norm(direct, self.settings)
         if self.phase == "ready":
             self._maybe_release(pushed)
         executed = self.world.step(self._asked(direct, pushed))
@@ -384,3 +384,12 @@ class Trial:
             lateness_s=stamps.lateness_s,
             round_trip_ms=stamps.round_trip_ms,
         )
+
+
+def _input_norm(direct: Array, settings: AssistanceSettings) -> float:
+    """‖u‖₂ from D(u), which is u times the speed at full stick."""
+    x, y, z, roll, pitch, yaw = direct.tolist()
+    return math.hypot(
+        math.hypot(x, y, z) / settings.full_stick_speed,
+        math.hypot(roll, pitch, yaw) / settings.full_stick_angular_speed,
+    )

@@ -28,6 +28,7 @@ from app.session.session import Session
 from app.session.spec import SessionOptions, WorkerSpec, parse_options
 from app.session.status import status_message
 from app.session.trial import CONTROL_DT_S
+from app.session.view_server import view_server
 from app.session.viewing import Viewing
 
 SWITCH_INTERVAL_S = 0.0005
@@ -88,66 +89,69 @@ def _run(spec: WorkerSpec, channel: Channel, inbox: Inbox, pacer: Pacer) -> str:
         append_event(folder, "worker_start", {"pid": os.getpid()})
     recorder = Recorder(folder)
     session = Session(spec, options, scene, settings, inbox, recorder, channel.send)
-    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
-    readers: list[LatestReader[Frame]] = []
-    viewing: Viewing | None = None
     try:
-        failures = _Failures(channel)
-        viewing = Viewing(
-            server,
-            scene,
-            theme=options.theme,
-            layers=options.layers,
-            camera=options.camera,
-            hide=options.hide,
-            rate_hz=options.viewer_hz,
-            on_error=failures.tell,
-        )
-        status = _Status(channel, viewing, options.hide)
-        readers.append(LatestReader("status", status.send, options.status_hz, failures.tell))
-        meter = HealthMeter(CONTROL_DT_S)
-        loop = Loop(pacer, meter, session.tick, lambda: inbox.ended != "")
-
-        def hello() -> dict[str, Any]:
-            return hello_message(
-                spec.id,
-                session.scene,
-                session.view,
-                session.trial.settings.method,
-                viewing.state.layers,
-                recorded=recorder.is_on,
-                watch=options.watch,
-                hide=options.hide,
-            )
-
-        session.connect(
-            viewing,
-            [viewing.offer, readers[0].offer],
-            meter.health,
-            pacer.restart,
-            lambda: channel.send(hello()),
-        )
-        port = server.get_port()
-        ready = {"type": "ready", "viewer_port": port, "pid": os.getpid(), "hello": hello()}
-        channel.send(ready)
-        loop.run()
+        with view_server() as server:
+            _serve(spec, options, session, channel, inbox, pacer, recorder, server)
     finally:
-        # The robot is simulated, so stopping the loop stops it; its log must still be closed.
-        session.close()
-        _close_all(readers, viewing, recorder)
-        server.stop()
+        recorder.close()
         if folder is not None:
             append_event(folder, "worker_end", {"pid": os.getpid(), "reason": inbox.ended})
     return inbox.ended
 
 
-def _close_all(
-    readers: Sequence[LatestReader[Frame]], viewing: Viewing | None, recorder: Recorder
+def _serve(
+    spec: WorkerSpec,
+    options: SessionOptions,
+    session: Session,
+    channel: Channel,
+    inbox: Inbox,
+    pacer: Pacer,
+    recorder: Recorder,
+    server: viser.ViserServer,
 ) -> None:
-    recorder.close()
-    for reader in readers:
-        reader.close()
-    if viewing is not None:
+    """Draw, say that all is ready, and loop."""
+    failures = _Failures(channel)
+    viewing = Viewing(
+        server,
+        session.scene,
+        theme=options.theme,
+        layers=options.layers,
+        camera=options.camera,
+        hide=options.hide,
+        rate_hz=options.viewer_hz,
+        on_error=failures.tell,
+    )
+    sender = _Status(channel, viewing, options.hide)
+    status = LatestReader("status", sender.send, options.status_hz, failures.tell)
+    meter = HealthMeter(CONTROL_DT_S)
+
+    def hello() -> dict[str, Any]:
+        return hello_message(
+            spec.id,
+            session.scene,
+            session.view,
+            session.trial.settings.method,
+            viewing.state.layers,
+            recorded=recorder.is_on,
+            watch=options.watch,
+            hide=options.hide,
+        )
+
+    session.connect(
+        viewing,
+        [viewing.offer, status.offer],
+        meter.health,
+        pacer.restart,
+        lambda: channel.send(hello()),
+    )
+    port = server.get_port()
+    channel.send({"type": "ready", "viewer_port": port, "pid": os.getpid(), "hello": hello()})
+    try:
+        Loop(pacer, meter, session.tick, lambda: inbox.ended != "").run()
+    finally:
+        # The robot is simulated: with the loop it stops. Its log is closed before all else.
+        session.close()
+        status.close()
         viewing.close()
 
 

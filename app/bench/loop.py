@@ -1,0 +1,121 @@
+"""What a tick of the control loop costs, and what is in it.
+
+All parts are timed in one process, in turns of a few calls each, so that a busy moment of the
+machine falls on all of them alike; ratios between them mean more than the figures.
+"""
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from app.core import UserInput, assist, initial_state, make_goals, preset, warm_up
+from app.core.types import Goals, Pose
+from app.robot.kinematics import Kinematics
+from app.robot.scene_file import load_scene
+from app.robot.simulation import CONTROL_DT, STEPS_PER_TICK
+from app.session.physics_world import PhysicsWorld
+from app.session.trial import Trial
+
+ROUNDS = 150
+CALLS = 10
+"""Calls of one part in a row."""
+RESTART_TICKS = 200
+
+Part = tuple[Callable[[], None], Callable[[], object]]
+"""What is done before some calls in a row, and the call that is timed."""
+
+
+def bench_loop() -> dict[str, dict[str, Any]]:
+    """Names → {median, p99, unit}: physics, ik, tick, assist_3x16, assist_3x30.
+
+    `physics` is the bare five steps of MuJoCo in free motion; `tick` is a whole tick of a live
+    session without its readers, in free motion under policy; its `ratio` to `physics` is told.
+    """
+    warm_up()
+    parts = {
+        "physics": _physics(),
+        "ik": _ik(),
+        "tick": _tick(),
+        "assist_3x16": _assist(16),
+        "assist_3x30": _assist(30),
+    }
+    samples: dict[str, list[float]] = {name: [] for name in parts}
+    for _, call in parts.values():
+        for _ in range(20):
+            call()
+    for _ in range(ROUNDS):
+        for name, (prepare, call) in parts.items():
+            prepare()
+            for _ in range(CALLS):
+                start = time.perf_counter()
+                call()
+                samples[name].append(1e6 * (time.perf_counter() - start))
+    figures: dict[str, dict[str, Any]] = {}
+    for name, values in samples.items():
+        median, p99 = np.percentile(values, [50, 99])
+        figures[name] = {"median": float(median), "p99": float(p99), "unit": "µs"}
+    figures["tick"]["ratio"] = figures["tick"]["median"] / figures["physics"]["median"]
+    return figures
+
+
+def _steering(count: int) -> UserInput:
+    """A push that circles, so that the hand moves freely over the table."""
+    angle = 2.0 * np.pi * count / 200.0
+    axes = (0.0, 0.0, 0.4 * float(np.cos(angle)), 0.4 * float(np.sin(angle)))
+    return UserInput(axes=axes, device="bench", sequence=count)
+
+
+def _nothing() -> None:
+    """No preparation."""
+
+
+def _tick() -> Part:
+    """A trial whose hand circles in the air, begun anew before assistance brings it anywhere."""
+    world = PhysicsWorld(load_scene("default"))
+    settings = preset("default", method="policy")
+    trials = [Trial(world, settings, "glass", start_delay_s=0.0)]
+
+    def prepare() -> None:
+        if trials[0].tick >= RESTART_TICKS:
+            world.reset(None)
+            trials[0] = Trial(world, settings, "glass", start_delay_s=0.0)
+
+    return prepare, lambda: trials[0].step(_steering(trials[0].tick))
+
+
+def _physics() -> Part:
+    simulation = PhysicsWorld(load_scene("default")).simulation
+    model, data = simulation.model, simulation.data
+    return _nothing, lambda: mujoco.mj_step(model, data, STEPS_PER_TICK)
+
+
+def _ik() -> Part:
+    scene = load_scene("default")
+    kinematics = Kinematics(scene)
+    q = scene.start_joint_positions
+    twist = np.array([0.1, 0.05, 0.02, 0.0, 0.0, 0.1])
+    velocity = np.zeros(len(q))
+    return _nothing, lambda: kinematics.solve(q, velocity, twist, CONTROL_DT)
+
+
+def _assist(n_targets: int) -> Part:
+    goals, pose = _random_goals(3, n_targets)
+    settings = preset("default", method="policy")
+    state = initial_state(goals, settings)
+    direct = np.array([0.1, 0.02, 0.0, 0.0, 0.0, 0.0])
+    return _nothing, lambda: assist(settings, goals, state, pose, direct, CONTROL_DT)
+
+
+def _random_goals(n_goals: int, n_targets: int) -> tuple[Goals, Pose]:
+    rng = np.random.default_rng(0)
+    targets = {
+        f"goal{i}": (
+            rng.normal([0.6, 0.3 * (i - 1), 0.1], 0.03, (n_targets, 3)),
+            rng.normal(size=(n_targets, 4)),
+        )
+        for i in range(n_goals)
+    }
+    return make_goals(targets), Pose(np.array([0.4, 0.0, 0.3]), np.array([1.0, 0.0, 0.0, 0.0]))
