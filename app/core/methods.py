@@ -11,6 +11,7 @@ import numpy as np
 
 from app.core.arbitration import ARBITRATIONS
 from app.core.backend import active
+from app.core.both_act import both_act_step
 from app.core.evaluation import GRADIENT, N_ROWS
 from app.core.exact import exact_step
 from app.core.situation import Situation
@@ -80,6 +81,8 @@ def policy_assistance(situation: Situation) -> Array:
     """Return what the policy adds to D(u) at gain 1 [m/s, rad/s], shape (6,)."""
     settings = situation.settings
     assistance = situation.expected_gradient / -settings.two_w
-    if settings.step == "exact":
+    if settings.takeover == "both-act":
+        assistance[:3] = both_act_step(situation)
+    elif settings.step == "exact":
         assistance[:3] = exact_step(situation)
     return assistance

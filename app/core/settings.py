@@ -57,6 +57,7 @@ class AssistanceSettings:
     step: Step = "first-order"  # of the argmin over the translation
     magnitude: Magnitude = "free"  # fixed: executed at the user's speed
     takeover: Takeover = "takes-over"  # both-act: experimental, policy and yielding only
+    user_speed: float = 0.056  # [m/s], both-act: what the user is expected to push with
     w_translation: float = 20.0  # w [nat s/m²]
     w_rotation: float = 0.025  # w [nat s/rad²]
     # yielding, as charged for translation; rotation is charged in proportion
@@ -144,6 +145,7 @@ _RANGES: dict[str, tuple[float, float, bool]] = {
     "belief_floor": (0.0, 0.5, False),
     "idle_drift": (*_UNBOUNDED, False),
     "evidence_half_life": (*_UNBOUNDED, True),
+    "user_speed": (*_UNBOUNDED, False),
     "w_translation": (*_UNBOUNDED, True),
     "w_rotation": (*_UNBOUNDED, True),
     "w_f": (*_UNBOUNDED, False),
