@@ -6,6 +6,7 @@ import statistics
 import subprocess
 import sys
 import textwrap
+import time
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -34,7 +35,6 @@ from app.recording.writer import TrialWriter
 from tests.recording.samples import make_header, make_step
 
 writer = TrialWriter(Path(sys.argv[1]), make_header())
-steps = [make_step(number) for number in range(100)]
 for number in range(10_000):
     step = make_step(number, monotonic_s=time.monotonic())
     writer.write(step)
@@ -89,7 +89,7 @@ def test_a_living_writer_is_left_alone(tmp_path: Path) -> None:
     writer = TrialWriter(folder, make_header())
     writer.write(make_step(0))
     while not list(folder.glob("*.part")):
-        pass
+        time.sleep(0.01)
     script = (
         "import sys; from app.recording.recovery import recover_trials;"
         "print([r.action for r in recover_trials(sys.argv[1])])"
