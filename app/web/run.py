@@ -14,6 +14,7 @@ from app.errors import AppError
 from app.web.config import ServerConfig
 from app.web.housekeeping import complete_logs, forget_old
 from app.web.server import create_app
+from app.web.sessions import SessionRegistry
 from app.web.workers import WorkerPool
 
 MAX_FRAME_BYTES = 64 * 1024
@@ -79,31 +80,42 @@ def address(config: ServerConfig, listener: socket.socket) -> str:
     return f"http://{host}:{listener.getsockname()[1]}"
 
 
-def server_settings(config: ServerConfig) -> uvicorn.Config:
-    """How uvicorn serves the application."""
-    return uvicorn.Config(
-        create_app(config, WorkerPool(config)),
-        access_log=False,  # addresses of participants do not belong in logs
-        log_level="warning",
-        log_config=None,
-        server_header=False,
-        proxy_headers=config.behind_tls_proxy,
-        ws="websockets-sansio",
-        ws_max_size=MAX_FRAME_BYTES,
-        ws_per_message_deflate=False,
-        ws_ping_interval=5.0,
-        ws_ping_timeout=10.0,
-        lifespan="on",
-        limit_concurrency=200 + 40 * config.max_workers,
-        timeout_graceful_shutdown=GRACEFUL_S,
-    )
+class HindsightServer(uvicorn.Server):
+    """A uvicorn that says goodbye to the pages before it closes their sockets."""
+
+    def __init__(self, config: ServerConfig) -> None:
+        self.application = create_app(config, WorkerPool(config))
+        super().__init__(
+            uvicorn.Config(
+                self.application,
+                access_log=False,  # addresses of participants do not belong in logs
+                log_level="warning",
+                log_config=None,
+                server_header=False,
+                proxy_headers=config.behind_tls_proxy,
+                ws="websockets-sansio",
+                ws_max_size=MAX_FRAME_BYTES,
+                ws_per_message_deflate=False,
+                ws_ping_interval=5.0,
+                ws_ping_timeout=10.0,
+                lifespan="on",
+                limit_concurrency=200 + 40 * config.max_workers,
+                timeout_graceful_shutdown=GRACEFUL_S,
+            )
+        )
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """End the sessions in order, then the server."""
+        registry: SessionRegistry = self.application.state.registry
+        await registry.close()
+        await super().shutdown(sockets)
 
 
 def _serve_until_signal(config: ServerConfig, listener: socket.socket) -> None:
     # uvicorn raises the signals it caught once more after its shutdown: let them be.
     before = {s: signal.signal(s, lambda *_: None) for s in (signal.SIGINT, signal.SIGTERM)}
     try:
-        server = uvicorn.Server(server_settings(config))
+        server = HindsightServer(config)
         server.run(sockets=[listener])
     finally:
         for number, handler in before.items():

@@ -129,10 +129,17 @@ class Session:
         if self.worker is not worker:
             return
         self.worker = None
-        if not ending.announced:
-            self._broadcast(to_json({"type": "ended", "reason": ending.text}))
+        if ending.announced:
+            for client in self.clients.values():
+                client.outbox.close(GONE_CODE, "ended")
+        else:
+            self.say_ended(ending.text)
+
+    def say_ended(self, reason: str) -> None:
+        """Tell every page that this is the end, and close its socket."""
         for client in self.clients.values():
-            client.outbox.close(GONE_CODE, ending.cause)
+            client.outbox.put(to_json({"type": "ended", "reason": reason}))
+            client.outbox.close(GONE_CODE, "ended")
 
     def _give_control(self, client: Client) -> None:
         previous, self.control = self.control, client

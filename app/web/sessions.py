@@ -9,8 +9,10 @@ from collections import OrderedDict
 from app.errors import AppError
 from app.session.spec import WorkerSpec
 from app.web.config import ServerConfig
+from app.web.housekeeping import complete_session
 from app.web.limits import KeyedBuckets
 from app.web.session import Session
+from app.web.worker import Ending, Worker
 from app.web.workers import WorkerPool
 
 MAX_IDLE = 5000
@@ -35,17 +37,21 @@ class SessionRegistry:
         self._by_id: OrderedDict[str, Session] = OrderedDict()
         self._restarts = KeyedBuckets(RESTARTS_PER_S, RESTART_BURST)
         self._janitor: asyncio.Task[None] | None = None
+        self._chores: set[asyncio.Task[int]] = set()
 
     def open(self) -> None:
         """Begin to look after the sessions."""
         self._janitor = asyncio.get_running_loop().create_task(self._look_after())
 
     async def close(self) -> None:
-        """End all sessions."""
+        """End all sessions; their pages are told."""
+        for session in self._by_id.values():
+            session.say_ended("The server was stopped.")
         if self._janitor is not None:
             self._janitor.cancel()
             await asyncio.gather(self._janitor, return_exceptions=True)
         await self.workers.close()
+        await asyncio.gather(*self._chores, return_exceptions=True)
 
     def issue(self) -> Session:
         """A new session, without a worker as yet."""
@@ -95,7 +101,19 @@ class SessionRegistry:
             session=str(session.runs + 1),
             options={**self._config.options, "watch": session.watch_path},
         )
-        session.attach(self.workers.start(spec, session.receive, session.worker_gone))
+
+        def gone(worker: Worker, ending: Ending) -> None:
+            session.worker_gone(worker, ending)
+            if ending.cause in ("crashed", "hung"):
+                self._complete_log(spec)
+
+        session.attach(self.workers.start(spec, session.receive, gone))
+
+    def _complete_log(self, spec: WorkerSpec) -> None:
+        """Finish what a dead worker wrote, beside the event loop."""
+        task = asyncio.create_task(asyncio.to_thread(complete_session, spec))
+        self._chores.add(task)
+        task.add_done_callback(self._chores.discard)
 
     async def _look_after(self) -> None:
         while True:

@@ -12,6 +12,8 @@ from dataclasses import dataclass
 from multiprocessing.context import ForkServerProcess
 from typing import Any, Literal
 
+import msgspec
+
 from app.session.spec import WorkerSpec
 from app.web.channel import MAX_QUEUE, Channel, Head
 from app.web.child import run_worker
@@ -156,7 +158,7 @@ class Worker:
             self.hello = head.hello or {}
             self.ready.set()
         elif head.type == "hello":
-            self.hello = head.hello or {}
+            self.hello = msgspec.json.decode(text)
         elif head.type == "ended":
             self._announced = True
         self._on_message(head, text)

@@ -12,13 +12,12 @@ from typing import Any
 
 import httpx
 import pytest
-import uvicorn
 from starlette.applications import Starlette
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
 from app.web.config import ServerConfig
-from app.web.run import bind, server_settings
+from app.web.run import HindsightServer, bind
 from app.web.sessions import SessionRegistry
 from app.web.viewer_page import subprotocol
 
@@ -177,9 +176,7 @@ def start_server(tmp_path: Path) -> Iterator[StartServer]:
         def start(**changes: Any) -> Server:
             config = replace(base, **changes)
             listener = stack.enter_context(bind(config))
-            settings = server_settings(config)
-            application: Any = settings.app
-            server = uvicorn.Server(settings)
+            server = HindsightServer(config)
             thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]})
             thread.start()
 
@@ -191,7 +188,7 @@ def start_server(tmp_path: Path) -> Iterator[StartServer]:
             wait_until(lambda: server.started or not thread.is_alive())
             assert server.started
             port = listener.getsockname()[1]
-            return Server(f"http://127.0.0.1:{port}", application, stack, stop)
+            return Server(f"http://127.0.0.1:{port}", server.application, stack, stop)
 
         yield start
 

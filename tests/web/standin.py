@@ -78,4 +78,7 @@ def _obey(message: dict[str, Any], send: Any) -> None:
         os._exit(7)
     elif message["name"] == "method" and message["method"] == "notice":
         send({"type": "notice", "level": "warn", "text": "the disk is full"})
+    elif message["name"] == "new-trial":
+        scene = {"name": message["scene"], "objects": []}
+        send({"type": "hello", "scene": scene, "control": False, "session": "x", "view": "x"})
     send({"type": "ack", "id": message["id"], "client": message["client"], "error": None})

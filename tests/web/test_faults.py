@@ -136,8 +136,8 @@ def test_a_flood_of_input_harms_only_its_own_socket(server: Server):
     with pytest.raises(ConnectionClosed) as caught:
         for number in range(100_000):
             page.push(number)
-        close_code(page)
-        raise AssertionError("the flood was not stopped")
+        while True:
+            page.socket.recv(30)
     assert caught.value.rcvd is None or caught.value.rcvd.code == 1008
     started = time.monotonic()
     assert bystander.command(1, "grasp")["error"] is None

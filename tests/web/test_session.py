@@ -57,6 +57,19 @@ def test_commands_are_answered_to_the_page_that_sent_them(server: Server):
     assert not [m for m in second.seen if m["type"] == "ack"]
 
 
+def test_a_new_scene_is_said_again_to_every_page(server: Server):
+    """The worker's hello is completed for each page; a page that comes later hears the new one."""
+    browser = server.browser()
+    page, second = browser.page(), browser.page()
+    page.send(type="command", id=1, name="new-trial", scene="clutter")
+    for tab, control in ((page, True), (second, False)):
+        hello = tab.next("hello")
+        assert hello["scene"]["name"] == "clutter"
+        assert (hello["control"], hello["session"]) == (control, browser.session)
+        assert hello["view"] == f"/view/{browser.session}/"
+    assert browser.page().hello["scene"]["name"] == "clutter"
+
+
 def test_ping_is_answered_at_once_and_its_round_trip_reaches_the_worker(server: Server):
     """The web process answers by itself, also while the worker is busy."""
     page = server.browser().page()
