@@ -75,7 +75,9 @@ def test_corrections_and_effect_sizes_agree_with_pingouin() -> None:
             assert effect.epsilon == pytest.approx(row["eps"])
             assert effect.p_corrected == pytest.approx(row["p_GG_corr"])
             if effect.df1 > 1:
-                assert effect.mauchly_p == pytest.approx(row["p_spher"])
+                # pingouin follows R, whose second-order term has the number of conditions where
+                # Anderson (2003) has the degrees of freedom: the third digit differs.
+                assert effect.mauchly_p == pytest.approx(row["p_spher"], abs=1e-3)
 
 
 def test_a_missing_cell_drops_its_participant_and_says_who() -> None:

@@ -1,0 +1,40 @@
+"""How numbers are written in the report."""
+
+from typing import Any
+
+import numpy as np
+
+DASH = "–"
+
+
+def number(value: float, digits: int = 2) -> str:
+    """A number with fixed digits, a real minus sign, and a dash where there is none."""
+    if value is None or not np.isfinite(value):
+        return DASH
+    text = f"{value:.{digits}f}"
+    if text.strip("-0.") == "":
+        text = text.lstrip("-")
+    return text.replace("-", "−")
+
+
+def p_value(p: float) -> str:
+    """A p-value for a table: .006, < .001 or a dash."""
+    if p is None or not np.isfinite(p):
+        return DASH
+    return "< .001" if p < 0.001 else ("1.000" if p >= 0.9995 else f"{p:.3f}"[1:])
+
+
+def interval(low: float, high: float, digits: int = 2) -> str:
+    """[low, high], or a dash."""
+    if not (np.isfinite(low) and np.isfinite(high)):
+        return DASH
+    return f"[{number(low, digits)}, {number(high, digits)}]"
+
+
+def significant(value: Any) -> str:
+    """About three significant digits, for measures of any size."""
+    if value is None or not np.isfinite(value):
+        return DASH
+    size = abs(float(value))
+    digits = 0 if size >= 100 else 1 if size >= 10 else 2 if size >= 0.1 or size == 0 else 4
+    return number(float(value), digits)
