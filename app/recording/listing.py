@@ -1,5 +1,6 @@
 """Lists of recorded trials: for `hindsight sessions`, the review page and the analysis."""
 
+import re
 import time
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
@@ -14,6 +15,10 @@ from app.recording.locks import is_locked
 from app.recording.messages import decode_header
 from app.recording.numbering import FINISHED, UNFINISHED
 from app.recording.schema import TrialHeader
+
+_PLACE = re.compile(
+    r"/(?P<study>[^/]+)/data/raw/subject-(?P<participant>[^/]+)/session-(?P<session>[^/]+)/[^/]+$"
+)
 
 
 def list_trials(root: Path | str, study: str | None = None) -> list[TrialEntry]:
@@ -77,14 +82,9 @@ def read_header(path: Path) -> TrialHeader | None:
 
 def _unusable(path: Path, problem: str) -> TrialEntry:
     """Where the file lies still tells whose trial it was."""
-    session, subject, study = path.parent.name, path.parents[1].name, path.parents[4].name
-    return TrialEntry(
-        path=str(path),
-        study=study,
-        participant=subject.removeprefix("subject-"),
-        session=session.removeprefix("session-"),
-        problem=problem,
-    )
+    entry = TrialEntry(path=str(path), problem=problem)
+    place = _PLACE.search(path.absolute().as_posix())
+    return msgspec.structs.replace(entry, **place.groupdict()) if place else entry
 
 
 _HEADINGS = (

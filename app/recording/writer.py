@@ -60,7 +60,7 @@ class TrialWriter:
         self.lost_steps = 0
         """Steps dropped because the disk has refused for many minutes."""
         self._sink = FileSink(Path(folder), header.trial)
-        self._encoder = TrialEncoder()
+        self._encoder: TrialEncoder  # made in the thread: a tick has no millisecond to spare
         self._queue: deque[StepRecord | TrialEvent] = deque()
         self._summaries = SummaryBuilder(header)
         self._summary: TrialSummary | None = None
@@ -114,6 +114,7 @@ class TrialWriter:
 
     def _run(self) -> None:
         try:
+            self._encoder = TrialEncoder()
             self._record()
         except Exception as error:  # a defect of ours; the loop must go on all the same
             self.error = f"the log of trial {self.header.trial} failed: {error!r}"

@@ -19,6 +19,7 @@ from app.recording.folders import EVENTS_FILE
 from app.recording.reader import read_steps, read_trial
 from app.recording.store import (
     append_event,
+    entry_of,
     format_trials,
     list_trials,
     open_session,
@@ -164,6 +165,7 @@ def test_a_list_shows_every_trial_whatever_its_state(
     ]
     junk, good, running = entries
     assert junk.problem.endswith("is not an MCAP file")
+    assert (junk.participant, junk.session) == ("p0001", "s1")
     assert good == read_entry(finished)
     assert (good.outcome, good.attempt, good.duration_s, good.input_s) == ("grasped", 2, 12.5, 4.25)
     assert (running.outcome, running.problem) == ("running", "")
@@ -196,3 +198,12 @@ def test_an_empty_folder_and_a_missing_one(tmp_path: Path) -> None:
     assert format_trials(list_trials(tmp_path)) == "No trials recorded."
     with pytest.raises(RecordingError, match="no folder of sessions"):
         list_trials(tmp_path / "missing")
+
+
+def test_an_unusable_file_anywhere_is_an_entry_with_its_problem(tmp_path: Path) -> None:
+    """Also outside the layout of sessions, where nothing tells whose it was."""
+    path = tmp_path / "x.mcap"
+    path.write_bytes(b"")
+    entry = entry_of(path)
+    assert (entry.problem, entry.study) == (f"{path} is empty", "")
+    assert "does not exist" in entry_of(Path("/x.mcap")).problem
