@@ -6,6 +6,7 @@
 import contextlib
 import fcntl
 import os
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -13,13 +14,24 @@ LOCK_NAME = ".trials.lock"
 """In every session's folder; holds the highest trial number handed out."""
 
 
+def lock(fd: int) -> None:
+    """Take the exclusive lock of an open file nobody else keeps."""
+    fcntl.flock(fd, fcntl.LOCK_EX)
+
+
 def try_lock(fd: int) -> bool:
-    """Take the exclusive lock of an open file unless another holder has it."""
-    try:
-        fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    return True
+    """Take the exclusive lock of an open file unless another holder keeps it.
+
+    Asks a few times: `is_locked` in another process holds the lock for microseconds.
+    """
+    for _ in range(5):
+        try:
+            fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            time.sleep(0.005)
+        else:
+            return True
+    return False
 
 
 def is_locked(path: Path) -> bool:

@@ -9,7 +9,7 @@ import os
 from pathlib import Path
 
 from app.recording.container import Buffer
-from app.recording.locks import folder_lock, try_lock
+from app.recording.locks import folder_lock, lock
 from app.recording.numbering import FINISHED, UNFINISHED, reserve_locked, trial_name
 
 
@@ -51,7 +51,7 @@ class FileSink:
                 os.close(folder_fd)
                 raise
             self._fd, self._folder_fd = fd, folder_fd
-            try_lock(fd)
+            lock(fd)
 
     def take(self, buffer: Buffer) -> None:
         """Append what waits in the buffer; bytes leave it only once they are in the file."""

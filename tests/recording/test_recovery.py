@@ -6,6 +6,7 @@ import statistics
 import subprocess
 import sys
 import textwrap
+import threading
 import time
 from collections.abc import Callable
 from functools import cache
@@ -17,6 +18,7 @@ from hypothesis import strategies as st
 
 from app.recording.container import TrialEncoder, scan, to_ns
 from app.recording.listing import list_trials
+from app.recording.locks import is_locked
 from app.recording.messages import decode
 from app.recording.reader import read_steps, read_trial
 from app.recording.recovery import recover_folder, recover_trials
@@ -271,3 +273,23 @@ def test_what_recovery_writes_is_what_the_log_held(tmp_path: Path) -> None:
         assert time_ns == to_ns(make_step(number).wall_s)
         assert decode(StepRecord, content) == make_step(number)
     assert not [name for name in os.listdir(tmp_path) if name.startswith(".trial-001")]
+
+
+def test_a_look_at_the_lock_does_not_stop_a_recovery(tmp_path: Path) -> None:
+    """Lists of trials look at locks all the time; an orphan is still found to be one."""
+    stop = threading.Event()
+    part = tmp_path / "trial-001.mcap.part"
+
+    def look() -> None:
+        while not stop.is_set():
+            is_locked(part)
+
+    looker = threading.Thread(target=look)
+    looker.start()
+    try:
+        for _ in range(20):
+            action, steps = _recover_bytes(tmp_path, _log()[0])
+            assert (action, len(steps)) == ("renamed", N_STEPS)
+    finally:
+        stop.set()
+        looker.join()
