@@ -89,7 +89,7 @@ def _tick() -> Part:
 def _physics() -> Part:
     simulation = PhysicsWorld(load_scene("default")).simulation
     model, data = simulation.model, simulation.data
-    return _nothing, lambda: mujoco.mj_step(model, data, STEPS_PER_TICK)
+    return _nothing, lambda: mujoco.mj_step(model, data, STEPS_PER_TICK)  # pyright: ignore[reportAttributeAccessIssue]
 
 
 def _ik() -> Part:

@@ -43,7 +43,6 @@ class Channel:
         self._status: Message | None = None
         self._waiting = threading.Condition()
         self._closing = False
-        self._broken = False
         self.malformed = 0
         """Lines that were no JSON object, or too long."""
         sock.setblocking(True)
@@ -103,7 +102,6 @@ class Channel:
             if len(rest) > MAX_LINE_BYTES:
                 self.malformed += not skipping
                 rest, skipping = b"", True
-        self._broken = True
         self._on_close()
 
     def _dispatch(self, decoder: "msgspec.json.Decoder[dict[str, Any]]", line: bytes) -> None:
@@ -120,14 +118,15 @@ class Channel:
             with self._waiting:
                 while not self._queue and self._status is None and not self._closing:
                     self._waiting.wait()
-                if self._queue:
-                    message = self._queue.popleft()
-                elif self._status is not None and not self._closing:
-                    message, self._status = self._status, None
-                else:
+                # What waits goes in one block: small messages cost the kernel's buffer far more
+                # than their size.
+                messages = list(self._queue)
+                self._queue.clear()
+                if not messages and self._status is not None and not self._closing:
+                    messages, self._status = [self._status], None
+                if not messages:
                     return  # closing, and nothing that must arrive is left
             try:
-                self._sock.sendall(encoder.encode(message) + b"\n")
+                self._sock.sendall(b"".join(encoder.encode(m) + b"\n" for m in messages))
             except OSError:
-                self._broken = True
                 return  # the reader sees the end of the stream and says so

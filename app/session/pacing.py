@@ -31,16 +31,26 @@ class Beat:
 class Pacer:
     """Waits for the next beat; owns the event that cuts the wait short."""
 
-    def __init__(self, period_s: float, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self,
+        period_s: float,
+        clock: Callable[[], float] = time.monotonic,
+        sleep: Callable[[float], object] = time.sleep,
+        wait: Callable[[float], object] | None = None,
+    ) -> None:
         """Begin the first slot now.
 
         Args:
             period_s: Length of a slot [s].
             clock: Monotonic clock [s].
+            sleep: Sleeps for seconds.
+            wait: Sleeps for seconds or until `wake`; None: on the pacer's own event.
         """
         self._period = period_s
         self._clock = clock
+        self._sleep = sleep
         self._wake = threading.Event()
+        self._wait = wait or self._wake.wait
         self._next = clock() + period_s
 
     def wake(self) -> None:
@@ -56,10 +66,10 @@ class Pacer:
         opens = self._next - self._period
         now = self._clock()
         if now < opens:  # the last tick ran early: its own slot has to pass first
-            time.sleep(opens - now)
+            self._sleep(opens - now)
             now = self._clock()
         if now < self._next:
-            self._wake.wait(self._next - now)
+            self._wait(self._next - now)
             now = self._clock()
         self._wake.clear()
         late = max(0.0, now - self._next)
