@@ -1,16 +1,17 @@
 """A killed process loses a quarter of a second; a torn file loses what is behind the tear."""
 
+import fcntl
 import os
 import signal
 import statistics
 import subprocess
 import sys
 import textwrap
-import threading
 import time
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from hypothesis import given, settings
@@ -18,7 +19,6 @@ from hypothesis import strategies as st
 
 from app.recording.container import TrialEncoder, scan, to_ns
 from app.recording.listing import list_trials
-from app.recording.locks import is_locked
 from app.recording.messages import decode
 from app.recording.reader import read_steps, read_trial
 from app.recording.recovery import recover_folder, recover_trials
@@ -275,21 +275,21 @@ def test_what_recovery_writes_is_what_the_log_held(tmp_path: Path) -> None:
     assert not [name for name in os.listdir(tmp_path) if name.startswith(".trial-001")]
 
 
-def test_a_look_at_the_lock_does_not_stop_a_recovery(tmp_path: Path) -> None:
-    """Lists of trials look at locks all the time; an orphan is still found to be one."""
-    stop = threading.Event()
+def test_a_look_at_the_lock_does_not_stop_a_recovery(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A list of trials holds an orphan's lock for a moment; the recovery waits for it."""
     part = tmp_path / "trial-001.mcap.part"
+    part.write_bytes(_log()[0])
+    looker = os.open(part, os.O_RDONLY)
+    fcntl.flock(looker, fcntl.LOCK_SH)
+    waits: list[float] = []
 
-    def look() -> None:
-        while not stop.is_set():
-            is_locked(part)
+    def end_the_look(seconds: float) -> None:
+        waits.append(seconds)
+        fcntl.flock(looker, fcntl.LOCK_UN)
 
-    looker = threading.Thread(target=look)
-    looker.start()
-    try:
-        for _ in range(20):
-            action, steps = _recover_bytes(tmp_path, _log()[0])
-            assert (action, len(steps)) == ("renamed", N_STEPS)
-    finally:
-        stop.set()
-        looker.join()
+    monkeypatch.setattr("app.recording.locks.time", SimpleNamespace(sleep=end_the_look))
+    (report,) = recover_folder(tmp_path)
+    os.close(looker)
+    assert (report.action, report.steps, len(waits)) == ("renamed", N_STEPS, 1)
