@@ -191,7 +191,13 @@ def format_p(p: float) -> str:
     """A p-value for a sentence: three digits, or "< .001"."""
     if not np.isfinite(p):
         return "undefined"
-    return "< .001" if p < 0.001 else f"= {p:.3f}".replace("0.", ".", 1)
+    # No-break spaces: "p <" alone at the end of a line reads badly.
+    return "<\N{NO-BREAK SPACE}.001" if p < 0.001 else f"=\N{NO-BREAK SPACE}{drop_zero(p)}"
+
+
+def drop_zero(p: float) -> str:
+    """Three digits, without the zero that no p needs."""
+    return f"{p:.3f}".removeprefix("0")
 
 
 def _judge_measure(

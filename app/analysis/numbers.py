@@ -1,7 +1,5 @@
 """How numbers are written in the report."""
 
-from typing import Any
-
 import numpy as np
 
 DASH = "–"
@@ -31,10 +29,7 @@ def interval(low: float, high: float, digits: int = 2) -> str:
     return f"[{number(low, digits)}, {number(high, digits)}]"
 
 
-def significant(value: Any) -> str:
-    """About three significant digits, for measures of any size."""
-    if value is None or not np.isfinite(value):
-        return DASH
-    size = abs(float(value))
-    digits = 0 if size >= 100 else 1 if size >= 10 else 2 if size >= 0.1 or size == 0 else 4
-    return number(float(value), digits)
+def mean_and_sd(mean: float, sd: float) -> str:
+    """A mean ± SD with as many digits as a measure of that size needs."""
+    digits = 1 if abs(mean) >= 10 else 2 if abs(mean) >= 0.1 else 4
+    return f"{number(mean, digits)} ± {number(sd, digits)}"

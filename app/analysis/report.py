@@ -109,7 +109,7 @@ def _background(results: Results) -> list[str]:
     """Answers of those analysed to the background questions, in numbers; free text stays out."""
     people = results.data.participants
     people = people[people["participant_id"].isin(results.participants)]
-    skipped = {"participant_id", "status", "excluded_by", "consent_version"}
+    skipped = {"participant_id", "cell", "status", "excluded_by", "consent_version"}
     lines = []
     for name in people.columns:
         counts = people[name].astype(str).str.strip().replace("", "no answer").value_counts()
@@ -119,7 +119,7 @@ def _background(results: Results) -> list[str]:
             or (len(counts) == 1 and counts.index[0] == "no answer")
         ):
             continue
-        counted = ", ".join(f"{n} {value}" for value, n in counts.items())
+        counted = ", ".join(f"{value} {n}" for value, n in counts.items())
         lines.append(f"{str(name).replace('_', ' ')}: {counted}")
     return lines
 

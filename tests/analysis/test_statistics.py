@@ -115,7 +115,7 @@ def test_an_anova_with_the_papers_f_prints_the_papers_p() -> None:
     values = np.stack([differences + 8.6, np.full(10, 8.6)], axis=1)[:, :, None]
     effect = one_way(make_cells(values)).effect("method")
     assert effect.f == pytest.approx(12.98)
-    assert format_p(effect.p) == "= .006"
+    assert format_p(effect.p) == "=\N{NO-BREAK SPACE}.006"
     assert compare(differences).dz == pytest.approx(1.14, abs=0.005)
 
 
