@@ -9,9 +9,6 @@ from pink.tasks import Task
 
 from app.core.types import Array
 
-BRAKING_SHARE = 0.7
-"""Part of the acceleration limit the braking distance counts on; below 1 as time is discrete."""
-
 UNITS = np.array([1.0, 1.0, 1.0, 0.3, 0.3, 0.3])  # [1, 1, 1, m/rad …]
 STRAIGHTNESS = 10.0
 
@@ -61,11 +58,12 @@ class TwistTask(Task):
 class MotionLimit(Limit):
     """Joint positions with room to brake, and joint acceleration, as one box that is never empty.
 
-    For the upper side (the lower is its mirror), with d = q_max − q:
-        q̇ ≤ q̇_prev + a dt,  q̇ ≤ √(2 · 0.7 a · d),  q̇ ≤ d / dt.
-    Where these leave nothing, the position limit wins over the acceleration. Pink's own
-    AccelerationLimit has no such order and makes the program infeasible there; without any
-    acceleration bound, joints jump by 60–280 rad/s² near a singularity.
+    For the upper side (the lower is its mirror), with d = q_max − q and a the acceleration limit:
+        q̇ ≤ q̇_prev + a dt,   q̇ dt + q̇²/(2a) ≤ d.
+    The second keeps, after this tick, room to stop at a; once it holds, it never asks for more than
+    a, so the two agree. From a state that breaks it (the arm was pushed), the position limit wins.
+    Pink's own AccelerationLimit has no such order and makes the program infeasible there; without
+    any acceleration bound, joints jump by 60–280 rad/s² near a singularity.
     """
 
     def __init__(self, low: Array, high: Array, velocity: Array, acceleration: Array) -> None:
@@ -92,9 +90,9 @@ class MotionLimit(Limit):
         return low, high
 
     def _reachable(self, room: Array, dt: float) -> Array:
-        room = np.maximum(room, 0.0)
-        braking = np.sqrt(2.0 * BRAKING_SHARE * self._acceleration * room)
-        return np.minimum(np.minimum(braking, room / dt), self._velocity)
+        acceleration, room = self._acceleration, np.maximum(room, 0.0)
+        fastest = acceleration * (np.sqrt(dt**2 + 2.0 * room / acceleration) - dt)
+        return np.minimum(fastest, self._velocity)
 
     def compute_qp_inequalities(
         self, configuration: Configuration, dt: float

@@ -37,6 +37,9 @@ REGULARISATION = 1e-3
 POSTURE_GAIN = 0.1
 """Share of the way to the start posture taken per tick along the free axis; 1 would jerk."""
 
+MIN_DT, MAX_DT = 1e-4, 0.1  # [s]: a shorter or longer tick is a mistake
+MAX_TWIST = 10.0  # [m/s, rad/s] of any component; what is asked beyond it only costs precision
+
 SolveStatus = Literal["solved", "braking"]
 
 
@@ -105,9 +108,10 @@ class Kinematics:
             q̇ [rad/s], shape (7,).
         """
         previous = _finite(qd_previous)
-        if not (np.isfinite(q).all() and np.isfinite(twist).all() and dt > 0.0):
-            return self._brake(previous, dt)
         previous = np.clip(previous, -MAX_VELOCITY, MAX_VELOCITY)
+        if not (np.isfinite(q).all() and np.isfinite(twist).all() and MIN_DT <= dt <= MAX_DT):
+            return self._brake(previous, dt)
+        twist = twist * min(1.0, MAX_TWIST / max(float(np.abs(twist).max()), MAX_TWIST))
         # Half a tick ahead, the Jacobian is that of the middle of the step: the hand leaves the
         # commanded line by O(dt³) rather than O(dt²) per tick.
         position = np.clip(q, JOINT_LOW, JOINT_HIGH)
@@ -123,11 +127,12 @@ class Kinematics:
         if not solution.found or solution.x is None or not np.isfinite(solution.x).all():
             return self._brake(previous, dt)
         self.status = "solved"
-        return np.clip(solution.x / dt, -MAX_VELOCITY, MAX_VELOCITY)
+        # daqp keeps the limits to 1e-6 rad, which is 1e-4 rad/s; here they are exact.
+        return np.clip(solution.x / dt, *self._motion.bounds(dt))
 
     def _brake(self, previous: Array, dt: float) -> Array:
         self.status = "braking"
-        step = MAX_ACCELERATION * (dt if np.isfinite(dt) and dt > 0.0 else 0.01)
+        step = MAX_ACCELERATION * (dt if MIN_DT <= dt <= MAX_DT else 0.01)
         return np.sign(previous) * np.maximum(np.abs(previous) - step, 0.0)
 
 
