@@ -73,6 +73,7 @@ class Cameras:
     def __init__(self, server: viser.ViserServer, preset: Preset = "operator"):
         self._server = server
         self.preset: str = preset
+        self._closed = False
         server.on_client_connect(self._arrived)
         self._set_initial()
 
@@ -89,6 +90,10 @@ class Cameras:
         for client in self._server.get_clients().values():
             self._place(client)
 
+    def close(self) -> None:
+        """Leave browsers that connect from now on to another view; viser keeps its callbacks."""
+        self._closed = True
+
     def _set_initial(self) -> None:
         """A first view for the moment before a browser has told its shape."""
         view, camera = view_for(self.preset, 1.6), self._server.initial_camera
@@ -96,7 +101,8 @@ class Cameras:
         camera.fov = float(np.radians(view.fov_degrees))
 
     def _arrived(self, client: viser.ClientHandle) -> None:
-        self._place(client)
+        if not self._closed:
+            self._place(client)
 
     def _place(self, client: viser.ClientHandle) -> None:
         camera = client.camera

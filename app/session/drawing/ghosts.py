@@ -43,7 +43,7 @@ def gripper_mesh(subject: Subject) -> trimesh.Trimesh:
             bodies.add(body)
     turn = data.site_xmat[subject.hand_site].reshape(3, 3)
     origin = data.site_xpos[subject.hand_site]
-    parts = []
+    parts: list[trimesh.Trimesh] = []
     for geom in range(model.ngeom):
         if int(model.geom_bodyid[geom]) not in bodies or not is_visible(model, geom):
             continue
@@ -54,7 +54,13 @@ def gripper_mesh(subject: Subject) -> trimesh.Trimesh:
         pose[:3, :3] = turn.T @ data.geom_xmat[geom].reshape(3, 3)
         pose[:3, 3] = turn.T @ (data.geom_xpos[geom] - origin)
         parts.append(part.apply_transform(pose))
-    return trimesh.util.concatenate(parts) if parts else trimesh.Trimesh()
+    if not parts:
+        return trimesh.Trimesh()
+    starts = np.cumsum([0] + [len(part.vertices) for part in parts[:-1]])
+    faces = [part.faces + start for part, start in zip(parts, starts, strict=True)]
+    return trimesh.Trimesh(
+        np.concatenate([part.vertices for part in parts]), np.concatenate(faces), process=False
+    )
 
 
 def _plain(model: mujoco.MjModel, geom: int) -> trimesh.Trimesh | None:

@@ -14,8 +14,10 @@ ROTATION_STEP = 2.0**-16
 
 
 def rounded(values: Sequence[float] | np.ndarray, step: float) -> tuple[float, ...]:
-    """Values to the nearest multiple of a step, as plain floats."""
-    return tuple((np.round(np.asarray(values, dtype=np.float64) / step) * step).tolist())
+    """Values to the nearest multiple of a step, as plain floats; never −0, which reads as new."""
+    plain = values.tolist() if isinstance(values, np.ndarray) else values
+    per_unit = 1.0 / step
+    return tuple([round(value * per_unit) * step for value in plain])
 
 
 class Outbox:

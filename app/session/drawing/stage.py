@@ -1,6 +1,8 @@
 # pyright: reportAttributeAccessIssue=false
 """What never moves: lights, surroundings, floor, and the table with its legs."""
 
+from typing import Literal
+
 import mujoco
 import numpy as np
 import viser
@@ -21,12 +23,22 @@ KEY_DIRECTION = (-0.75, 0.75, 1.9)
 how high a thing is."""
 FILL_DIRECTION = (0.9, -1.5, 0.9)
 
+Detail = Literal["full", "plain"]
+PLAIN_SKY = 1.6
+"""Intensity of the hemisphere light where it has to stand in for the environment map."""
+
 
 class Stage:
     """Everything fixed to the world; rebuilt in place when the theme changes."""
 
-    def __init__(self, server: viser.ViserServer, subject: Subject, theme: Theme):
-        self._scene, self._subject = server.scene, subject
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        subject: Subject,
+        theme: Theme,
+        detail: Detail = "full",
+    ):
+        self._scene, self._subject, self._detail = server.scene, subject, detail
         self._scene.set_up_direction("+z")
         self._scene.world_axes.visible = False
         self._scene.configure_default_lights(False, False)
@@ -35,17 +47,19 @@ class Stage:
     def set_theme(self, theme: Theme) -> None:
         """Put lights, floor and table into a theme's colours."""
         self._lights(theme)
-        self._floor(theme)
+        if self._detail == "full":
+            self._floor(theme)
         self._static_bodies(theme)
 
     def _lights(self, theme: Theme) -> None:
-        scene = self._scene
-        scene.configure_environment_map("studio", environment_intensity=theme.environment)
+        scene, full = self._scene, self._detail == "full"
+        if full:
+            scene.configure_environment_map("studio", environment_intensity=theme.environment)
         scene.add_light_directional(
             "/hindsight/light/key",
             color=(255, 246, 234),
             intensity=theme.key,
-            cast_shadow=True,
+            cast_shadow=full,
             position=KEY_DIRECTION,
         )
         scene.add_light_directional(
@@ -59,7 +73,7 @@ class Stage:
             "/hindsight/light/sky",
             sky_color=rgb(sky),
             ground_color=rgb(ground),
-            intensity=intensity,
+            intensity=intensity if full else PLAIN_SKY,
         )
 
     def _floor(self, theme: Theme) -> None:

@@ -26,7 +26,7 @@ from app.session.drawing.path import PathNodes
 from app.session.drawing.robot import RobotNodes
 from app.session.drawing.slice_layer import SliceLayer, SliceRequest, ValueSlice
 from app.session.drawing.slice_plane import Bounds
-from app.session.drawing.stage import Stage
+from app.session.drawing.stage import Detail, Stage
 from app.session.drawing.subject import TABLE, Subject, subject_of
 from app.session.drawing.target import TargetNode
 
@@ -46,6 +46,7 @@ class Viewer:
         scene: Scene | Subject,
         theme: str = "dark",
         *,
+        detail: Detail = "full",
         labels: bool = False,
         value_slice: ValueSlice = value_slice,
     ) -> None:
@@ -55,6 +56,8 @@ class Viewer:
             server: Where to draw.
             scene: A scene, or a model already sorted by `subject_of` (any robot).
             theme: "dark" or "light".
+            detail: "plain" leaves out shadows, environment map and floor, which a browser without a
+                graphics card spends most of its time on.
             labels: Draw probabilities into the scene as viser's labels, for a page without our own
                 tags, such as a shared HTML file.
             value_slice: Computes the slice; `app.core.value_slice` but in tests.
@@ -74,7 +77,7 @@ class Viewer:
         self._last: tuple[StepRecord, Goals | None, AssistanceSettings | None] | None = None
         with server.atomic():
             self._cameras = Cameras(server)
-            self._stage = Stage(server, subject, chosen)
+            self._stage = Stage(server, subject, chosen, detail)
             self._robot = RobotNodes(server, subject, chosen, self._outbox)
             self._objects = ObjectNodes(server, subject, self._outbox)
             self._hand = HandNodes(server, chosen, self._outbox)
@@ -178,7 +181,8 @@ class Viewer:
         self._server.flush()
 
     def close(self) -> None:
-        """End the view's own thread; the server stays."""
+        """End the view's own thread and let go of the cameras; nodes and server stay."""
+        self._cameras.close()
         self._slice.close()
 
     @property
