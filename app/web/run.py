@@ -80,10 +80,25 @@ def address(config: ServerConfig, listener: socket.socket) -> str:
     return f"http://{host}:{listener.getsockname()[1]}"
 
 
+class _Denials(logging.Filter):
+    """Drops the complaint about a handshake that was answered by a refusal.
+
+    uvicorn 0.54 writes it for every such answer, so that anyone could fill the log.
+    """
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        """Whether the record is to be written."""
+        return record.getMessage() != "ASGI callable returned without completing handshake."
+
+
+_DENIALS = _Denials()
+
+
 class HindsightServer(uvicorn.Server):
     """A uvicorn that says goodbye to the pages before it closes their sockets."""
 
     def __init__(self, config: ServerConfig) -> None:
+        logging.getLogger("uvicorn.error").addFilter(_DENIALS)
         self.application = create_app(config, WorkerPool(config))
         super().__init__(
             uvicorn.Config(

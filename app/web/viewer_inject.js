@@ -17,6 +17,12 @@
   // viser reconnects only while its own document has focus, which the page around it holds.
   document.hasFocus = () => true;
 
+  // viser loads a sorter of Gaussian splats that compiles text to code, which the frame's policy
+  // forbids. Nothing of ours is a splat; the failed promise need not look like a fault.
+  addEventListener("unhandledrejection", (event) => {
+    if (event.reason instanceof EvalError) event.preventDefault();
+  });
+
   // A click into the view takes the keyboard: hand every key to the page instead. viser's own
   // shortcuts would move the camera. Tab stays, so that the keyboard can leave the frame.
   const forward = (event) => {
