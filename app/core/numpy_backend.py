@@ -43,12 +43,23 @@ def update(
     """
     if not x[3:7] @ x[3:7] > SMALLEST_QUATERNION**2 or not np.isfinite(x).all():
         return False
+    if not _consistent(goals):
+        return False
     evaluate(settings, goals, x, rows, best_targets)
     if not np.isfinite(rows[:BELIEF]).all():
         return False
     condition(settings, rows, log_belief, log_prior, evidence)
     expected_gradient[:] = rows[GRADIENT : GRADIENT + 6] @ rows[BELIEF]
     return True
+
+
+def _consistent(goals: Goals) -> bool:
+    n, ends = len(goals.positions), goals.offsets
+    if len(ends) != goals.n_goals + 1 or ends[0] != 0 or ends[-1] != n or np.diff(ends).min() < 1:
+        return False
+    if goals.positions.shape != (n, 3) or goals.quaternions.shape != (n, 4):
+        return False
+    return bool(np.isfinite(goals.positions).all() and np.isfinite(goals.quaternions).all())
 
 
 def fill_grid(
