@@ -68,9 +68,10 @@ class HandController:
             return HandCommand(None, self._finger)
         twist = np.zeros(6)
         if self.phase == "lifting":
-            # Speed up, and slow down in time to stop at the top: v² ≤ 2 a (what is left).
+            # Speed up, and slow down in time to stop at the top: v dt + v²/(2a) ≤ what is left.
             left = max(LIFT_DISTANCE - self._lifted, 0.0)
-            braking = (2.0 * LIFT_ACCELERATION * left) ** 0.5
+            room = (CONTROL_DT**2 + 2.0 * left / LIFT_ACCELERATION) ** 0.5
+            braking = LIFT_ACCELERATION * (room - CONTROL_DT)
             faster = self._speed + LIFT_ACCELERATION * CONTROL_DT
             self._speed = min(faster, LIFT_SPEED, braking)
             self._lifted += self._speed * CONTROL_DT

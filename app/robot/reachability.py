@@ -44,19 +44,33 @@ class ReachabilityCheck:
         Args:
             grasp: T_world_ee, shape (4, 4).
         """
-        rotation, position = grasp[:3, :3], grasp[:3, 3]
-        poses = [position - distance * rotation[:, 2] for distance in STAND_OFFS]
-        if not all(self._wrist_in_range(point, rotation) for point in poses):
-            return False
-        return any(self._follows(poses, rotation, seed) for seed in self._seeds(position))
+        return self.path(grasp) is not None
 
-    def _follows(self, poses: list[Array], rotation: Array, seed: Array) -> bool:
+    def path(self, grasp: Array) -> list[Array] | None:
+        """Joint positions [rad] 10 cm and 5 cm before a grasp and at it, or None.
+
+        Args:
+            grasp: T_world_ee, shape (4, 4).
+        """
+        rotation, position = grasp[:3, :3], grasp[:3, 3]
+        points = [position - distance * rotation[:, 2] for distance in STAND_OFFS]
+        if not all(self._wrist_in_range(point, rotation) for point in points):
+            return None
+        for seed in self._seeds(position):
+            path = self._follow(points, rotation, seed)
+            if path is not None:
+                return path
+        return None
+
+    def _follow(self, points: list[Array], rotation: Array, seed: Array) -> list[Array] | None:
+        path: list[Array] = []
         q: Array | None = seed
-        for point in poses:
+        for point in points:
             q = self._solver.solve(point, rotation, q)
             if q is None or self.touches(q):
-                return False
-        return True
+                return None
+            path.append(q)
+        return path
 
     def _wrist_in_range(self, position: Array, rotation: Array) -> bool:
         """A cheap necessary condition, before any iteration: most candidates fail here."""

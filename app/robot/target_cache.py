@@ -2,9 +2,11 @@
 
 import hashlib
 import os
+import struct
 import tempfile
 from importlib.metadata import version
 from pathlib import Path
+from zipfile import BadZipFile
 
 import numpy as np
 
@@ -41,7 +43,7 @@ def read_cache(key: str) -> list[Array] | None:
     try:
         with np.load(cache_folder() / f"grasps-{key}.npz", allow_pickle=False) as stored:
             grasps = [stored[f"object_{i}"] for i in range(len(stored.files))]
-    except (OSError, ValueError, KeyError, EOFError):
+    except (OSError, ValueError, LookupError, EOFError, BadZipFile, struct.error):
         return None
     whole = all(part.ndim == 3 and part.shape[1:] == (4, 4) and len(part) for part in grasps)
     return grasps if grasps and whole else None

@@ -5,7 +5,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import mujoco
 import numpy as np
 import pytest
 
@@ -160,7 +159,7 @@ def test_geoms_have_names_and_say_what_they_are(scene: Scene) -> None:
     names = [model.geom(i).name for i in range(model.ngeom)]
     assert all(names) and len(set(names)) == len(names)
     assert {"canteen/body", "canteen/neck", "block/body", "glass/body", "table"} <= set(names)
-    materials = {mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_MATERIAL, i) for i in range(4)}
+    materials = {model.mat(i).name for i in range(model.nmat)}
     assert materials == {"shell", "joint", "ring", "pad"}
 
 
