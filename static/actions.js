@@ -45,7 +45,7 @@ export function createActions(store, socket, page) {
       send("method", { method });
     },
     methodNumber(index) {
-      const method = store.state.hello?.methods[index];
+      const method = store.state.hello?.methods?.[index];
       if (method) actions.method(method);
     },
     toggleAssist() {

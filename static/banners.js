@@ -19,6 +19,7 @@ export function describeOutcome({ outcome, target, grasped }) {
     case "knocked_over": return ["bad", "An object was knocked over"];
     case "fell_off": return ["bad", "An object fell off the table"];
     case "timeout": return ["warn", "Time is up"];
+    case "done": return ["ok", "The trial is finished"];
     case "interrupted": return ["warn", "The trial was interrupted"];
     default: return ["warn", "The trial was ended"];
   }

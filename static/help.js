@@ -36,7 +36,9 @@ export function createHelp() {
   );
   dialog.addEventListener("click", (event) => event.target === dialog && dialog.close());
   dialog.addEventListener("keydown", (event) => {
-    if (event.code === "KeyH" && !event.ctrlKey && !event.metaKey) dialog.close();
+    if (event.code !== "KeyH" || event.ctrlKey || event.metaKey) return;
+    event.stopPropagation(); // the page would open it again
+    dialog.close();
   });
   return { open: () => !dialog.open && dialog.showModal() };
 }

@@ -3,6 +3,8 @@
  * when the page loses its user. The device pushed last wins; the others are not added.
  */
 
+import { clock } from "./socket.js";
+
 export const DEAD_ZONE = 0.1;
 const FAST = 15; // least time between inputs while pushed: 60 Hz and a timer's jitter [ms]
 const SLOW = 100; // [ms]
@@ -111,6 +113,7 @@ export class Input {
     this.sentAt = now;
     this.sentRest = rest;
     this.socket.sendInput({
+      t: clock(now),
       left: [axes[0], axes[1]],
       right: [axes[2], axes[3]],
       mode: state.mode,

@@ -74,6 +74,7 @@ document.querySelector(".dev").addEventListener("click", pads.open);
 function receive(message) {
   if (message.type === "status") store.update({ status: message });
   else if (message.type === "notice") say(message.level, message.text);
+  else if (message.type === "error") say("error", message.text);
   else if (message.type === "hello") welcome(message);
 }
 

@@ -6,6 +6,7 @@
 const PING_EVERY = 1000; // [ms]
 const SILENT_AFTER = 4000; // no message for so long means a dead line [ms]
 const GIVE_UP_AFTER = 75_000; // the server ends a session a minute after its page went [ms]
+const SPARE = 1000; // numbers left for what is sent between storing the last one and leaving
 const BACKOFF = [250, 500, 1000, 2000, 3000, 5000]; // [ms]
 
 export class Socket {
@@ -48,9 +49,9 @@ export class Socket {
     socket.onclose = (event) => socket === this.socket && this.#closed(event);
   }
 
-  /** @param {Omit<import("./types.js").InputMessage, "type"|"seq"|"t">} fields */
+  /** @param {Omit<import("./types.js").InputMessage, "type"|"seq">} fields */
   sendInput(fields) {
-    this.#send({ type: "input", seq: ++this.sequence, t: clock(), ...fields });
+    this.#send({ type: "input", seq: ++this.sequence, ...fields });
   }
 
   /** A page event: blur, focus, hidden, visible. */
@@ -142,9 +143,9 @@ export class Socket {
   }
 }
 
-/** A clock that never steps back, in milliseconds of the wall clock at the page's start. */
-export function clock() {
-  return performance.timeOrigin + performance.now();
+/** A clock that never steps back: `now` of performance.now() on the wall clock of the page's start [ms]. */
+export function clock(now = performance.now()) {
+  return performance.timeOrigin + now;
 }
 
 function restoreSequence() {
@@ -157,7 +158,7 @@ function restoreSequence() {
 
 function saveSequence(sequence) {
   try {
-    sessionStorage.setItem("hindsight.sequence", String(sequence));
+    sessionStorage.setItem("hindsight.sequence", String(sequence + SPARE));
   } catch {
     // Without storage a reload starts at one, as a new client.
   }

@@ -132,6 +132,11 @@ class FakeServer:
         self.refuse = False
         self.connections = 0
 
+    @property
+    def pages(self) -> int:
+        """Pages that were greeted and are still there."""
+        return len(self._sockets)
+
     def of_type(self, kind: str) -> list[dict[str, Any]]:
         """Messages of one type, oldest first."""
         return [message for message in list(self.received) if message["type"] == kind]
