@@ -41,9 +41,20 @@ def cache_key(scene: Scene) -> str:
 def read_cache(key: str) -> list[Array] | None:
     """Grasps per object, or None where they are not there or not whole."""
     try:
-        with np.load(cache_folder() / f"grasps-{key}.npz", allow_pickle=False) as stored:
-            grasps = [stored[f"object_{i}"] for i in range(len(stored.files))]
-    except (OSError, ValueError, LookupError, EOFError, BadZipFile, struct.error):
+        # Opened here, because np.load forgets to close what turns out to be no archive.
+        with open(cache_folder() / f"grasps-{key}.npz", "rb") as file:
+            with np.load(file, allow_pickle=False) as stored:
+                grasps = [stored[f"object_{i}"] for i in range(len(stored.files))]
+    except (
+        OSError,
+        ValueError,
+        LookupError,
+        AttributeError,
+        TypeError,
+        EOFError,
+        BadZipFile,
+        struct.error,
+    ):
         return None
     whole = all(part.ndim == 3 and part.shape[1:] == (4, 4) and len(part) for part in grasps)
     return grasps if grasps and whole else None
