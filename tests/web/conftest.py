@@ -21,7 +21,7 @@ from app.web.run import HindsightServer, bind
 from app.web.sessions import SessionRegistry
 from app.web.viewer_page import subprotocol
 
-WAIT_S = 30.0
+WAIT_S = 120.0
 """How long a test waits for something that must happen; no limit of speed."""
 
 
