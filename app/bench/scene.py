@@ -58,8 +58,8 @@ class CountingClient:
 def bench_scene() -> dict[str, dict[str, Any]]:
     """Names → {median, p99, unit}: scene_update, slice_64, slice_128.
 
-    `scene_update` is one `Viewer.update` while all joints move, at 60 Hz with one client connected;
-    beside it stand what the client receives [kB/s], in how many windows a second, and the share of
+    `scene_update` is one `Viewer.update` at 60 Hz with one client connected, while all seven joints,
+    both arrows and the belief change in every tick, which a trial does not ask for; beside it stand what the client receives [kB/s], in how many windows a second, and the share of
     a core the whole process spends. `slice_n` is an n × n picture: values, colours, PNG.
     """
     with _server() as server:
@@ -83,7 +83,7 @@ def _scene_update(server: viser.ViserServer) -> dict[str, Any]:
     scene = load_scene("default")
     records, goals = moving_records(scene, round(RATE_HZ * SECONDS)), _goals(scene)
     viewer = Viewer(server, scene)
-    viewer.set_layers({"slice": False, "path": True})
+    viewer.set_layers({"slice": False})
     client = CountingClient(server.get_port())
     try:
         for record in records[:30]:

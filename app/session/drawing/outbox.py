@@ -52,8 +52,8 @@ class Outbox:
             self.count += 1
 
     def points(self, handle: viser.ArrowsHandle, points: np.ndarray) -> None:
-        """Assign an array of points [m], rounded to 0.1 mm."""
-        key, value = (handle.name, "points"), np.round(points, 4).astype(np.float32)
+        """Assign an array of points [m], rounded to 1 mm: the length of an arrow is no gauge."""
+        key, value = (handle.name, "points"), np.round(points, 3).astype(np.float32)
         before = self._sent.get(key)
         if before is None or not np.array_equal(before, value):
             self._sent[key] = value

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 FILLET_M = 0.004  # [m]
 SEGMENTS = 64
-ARC_STEPS = 4  # facets of a fillet
+ARC_STEPS = 3  # facets of a fillet
 
 F32 = npt.NDArray[np.float32]
 
@@ -116,7 +116,7 @@ def cylinder(radius: float, half_height: float) -> Surface:
 
 def capsule(radius: float, half_height: float) -> Surface:
     """A capsule about z: a cylinder of this half height between two half spheres."""
-    lower, upper = _arc(-np.pi / 2, 0.0, SEGMENTS // 4), _arc(0.0, np.pi / 2, SEGMENTS // 4)
+    lower, upper = _arc(-np.pi / 2, 0.0, SEGMENTS // 8), _arc(0.0, np.pi / 2, SEGMENTS // 8)
     profile = np.concatenate(
         [radius * lower - [0.0, half_height], radius * upper + [0.0, half_height]]
     )

@@ -1,9 +1,12 @@
 """Numbers to pixels: the value function on a grid as a translucent picture."""
 
+from functools import lru_cache
+
 import numpy as np
 import numpy.typing as npt
 
 from app.session.drawing.palette import RAMP, Theme, rgb
+from app.session.drawing.palette import theme as theme_by_name
 
 ISO_STEP_NAT = 0.125
 MOST_ISO_LINES = 16
@@ -12,6 +15,7 @@ FADE_M = 0.04  # [m] from full to nothing at the edge
 ALPHA_POWER = 1.3
 ISO_ALPHA = (0.16, 0.22)  # of a line: at the far end, and what is added towards the goal
 ISO_WIDTH_PX = 1.0
+COVERS = 8  # steps from no line to all line
 RANGE_STEP_NAT = 0.05  # the range is rounded outward to this, so that the legend holds still
 SHADES = 64
 """Steps of the ramp. Fewer distinct pixels make the PNG half as long; a step is below what the eye
@@ -43,6 +47,7 @@ def ramp_colours(theme: Theme, shades: int = SHADES) -> npt.NDArray[np.uint8]:
     return np.round(np.stack(channels, axis=1)).astype(np.uint8)
 
 
+@lru_cache(maxsize=8)
 def edge_fade(shape: tuple[int, int], cell_m: float) -> npt.NDArray[np.float64]:
     """Factor on opacity that falls to nothing within 40 mm of the edge, smooth at both ends."""
     rows, columns = (
@@ -72,24 +77,41 @@ def slice_picture(
     low, high = value_range(values)
     near = np.clip((high - values) / (high - low), 0.0, 1.0)
     shade = np.round(near * (SHADES - 1)).astype(np.intp)
-    level = shade / (SHADES - 1)
-    least, most = theme.slice_alpha
-    colour = ramp_colours(theme)[shade].astype(np.float64)
-    alpha = least + (most - least) * level**ALPHA_POWER
-    if iso_lines:
-        step = iso_step(low, high)
-        phase = values / step
-        away = np.abs(phase - np.round(phase)) * step  # [nat] to the nearest line
-        slope_rows, slope_columns = np.gradient(values)
-        slope = np.hypot(slope_rows, slope_columns)  # [nat] per pixel
-        cover = np.clip(0.5 * ISO_WIDTH_PX + 0.5 - away / np.maximum(slope, 1e-9), 0.0, 1.0)
-        line = np.round(cover * 8.0) / 8.0 * (ISO_ALPHA[0] + ISO_ALPHA[1] * level)
-        # the line is white over the ramp; both lie over what is behind
-        total = line + alpha * (1.0 - line)
-        below = (alpha * (1.0 - line))[..., None]
-        colour = (255.0 * line[..., None] + colour * below) / total[..., None]
-        alpha = total
-    picture = np.empty((*values.shape, 4), dtype=np.uint8)
-    picture[..., :3] = np.round(colour)
-    picture[..., 3] = np.round(255.0 * alpha * edge_fade(values.shape, cell_m))
+    cover = _iso_cover(values, iso_step(low, high)) if iso_lines else np.zeros_like(shade)
+    picture = _pixels(theme.name)[shade, cover]
+    picture[..., 3] = np.round(picture[..., 3] * edge_fade(values.shape, cell_m))
     return picture, (low, high)
+
+
+def _iso_cover(values: npt.NDArray[np.float64], step: float) -> npt.NDArray[np.intp]:
+    """How much of each pixel a line covers, in eighths, shape of values.
+
+    The distance to the nearest line in pixels is the distance in value over the slope, so lines
+    are equally wide where the function is steep and where it is flat.
+    """
+    phase = values / step
+    away = np.abs(phase - np.round(phase))
+    down, across = np.gradient(phase)
+    slope = np.hypot(down, across)  # [steps] per pixel
+    covered = np.clip(0.5 * ISO_WIDTH_PX + 0.5 - away / np.maximum(slope, 1e-9), 0.0, 1.0)
+    return np.round(covered * COVERS).astype(np.intp)
+
+
+@lru_cache(maxsize=4)
+def _pixels(name: str) -> npt.NDArray[np.uint8]:
+    """Every pixel a slice in a theme can hold, by shade and cover, shape (SHADES, COVERS + 1, 4).
+
+    The line is white over the ramp, and both lie over what is behind them.
+    """
+    look = theme_by_name(name)
+    level = np.linspace(0.0, 1.0, SHADES)[:, None]
+    least, most = look.slice_alpha
+    ramp = least + (most - least) * level**ALPHA_POWER
+    line = np.linspace(0.0, 1.0, COVERS + 1) * (ISO_ALPHA[0] + ISO_ALPHA[1] * level)
+    below = ramp * (1.0 - line)
+    total = line + below
+    pixels = np.empty((SHADES, COVERS + 1, 4))
+    colours = ramp_colours(look)[:, None, :]
+    pixels[..., :3] = (255.0 * line[..., None] + colours * below[..., None]) / total[..., None]
+    pixels[..., 3] = 255.0 * total
+    return np.round(pixels).astype(np.uint8)
