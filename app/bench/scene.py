@@ -58,8 +58,9 @@ class CountingClient:
 def bench_scene() -> dict[str, dict[str, Any]]:
     """Names → {median, p99, unit}: scene_update, slice_64, slice_128.
 
-    `scene_update` is one `Viewer.update` at 60 Hz with one client connected, while all seven joints,
-    both arrows and the belief change in every tick, which a trial does not ask for; beside it stand what the client receives [kB/s], in how many windows a second, and the share of
+    `scene_update` is one `Viewer.update` at 60 Hz with one client connected, while all joints, both
+    arrows and the belief change in every tick, more than a trial asks for. Beside it stand what the
+    client receives [kB/s], in how many windows a second, and the share of
     a core the whole process spends. `slice_n` is an n × n picture: values, colours, PNG.
     """
     with _server() as server:
