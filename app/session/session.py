@@ -80,6 +80,8 @@ class Session:
         self._on_scene: Callable[[], None] = lambda: None
         self._health: Callable[[], Health] = Health
         self._problem: str | None = None
+        self._control: object = None
+        self._left = False
         self._done_ticks = 0
         self._shown_as = ""
         target = options.target or self._order.next()
@@ -172,11 +174,18 @@ class Session:
         if kind == "event":
             self.trial.note(str(message.get("name", "")), client=str(message.get("client", "")))
         elif kind == "clients":
-            gained = message.get("control") is not None
-            name = "reconnect" if gained else "disconnect"
-            self.trial.note(name, count=message.get("count"))
+            self._note_control(message.get("control"))
         elif kind == "command":
             self._answer(message)
+
+    def _note_control(self, control: object) -> None:
+        """Record that the page in control is gone, or is back; spectators come and go unnoted."""
+        had, self._control = self._control, control
+        if had is not None and control is None:
+            self.trial.note("disconnect")
+            self._left = True
+        elif had is None and control is not None and self._left:
+            self.trial.note("reconnect")
 
     def _answer(self, message: Mapping[str, Any]) -> None:
         try:

@@ -10,7 +10,6 @@ Live sessions, simulated users, replay and tests step it alike. Whoever owns a c
 ticks; the trial itself counts them.
 """
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -21,7 +20,6 @@ from app.core import (
     AssistanceSettings,
     Goals,
     UserInput,
-    compute_command,
     settings_to_dict,
 )
 from app.core.types import Array
@@ -38,6 +36,7 @@ from app.session.commands import Command, CommandError
 from app.session.header import TrialIdentity, make_header
 from app.session.spec import START_DELAY_S, StartRule
 from app.session.stamps import NO_STAMPS, Stamps
+from app.session.steering import Steering
 from app.session.worlds import Verdict, World
 
 CONTROL_DT_S = 0.01
@@ -122,6 +121,7 @@ class Trial:
         self._late = 0
         self._buttons = 0
         self._halted = False
+        self._steering = Steering()
         self._stamps = Stamps(wall_s=wall_s)
         self._events: list[TrialEvent] = []
         self._header = make_header(self, wall_s)
@@ -147,8 +147,7 @@ class Trial:
         self._watch(stamps)
         for command in commands:
             self.command(command)
-        direct = compute_command(user_input, self.settings)
-        pushed = _input_norm(direct, self.settings)
+        direct, pushed = self._steering.command(user_input, self.settings)
         if self.phase == "ready":
             self._maybe_release(pushed)
         executed = self.world.step(self._asked(direct, pushed))
@@ -384,12 +383,3 @@ class Trial:
             lateness_s=stamps.lateness_s,
             round_trip_ms=stamps.round_trip_ms,
         )
-
-
-def _input_norm(direct: Array, settings: AssistanceSettings) -> float:
-    """‖u‖₂ from D(u), which is u times the speed at full stick."""
-    x, y, z, roll, pitch, yaw = direct.tolist()
-    return math.hypot(
-        math.hypot(x, y, z) / settings.full_stick_speed,
-        math.hypot(roll, pitch, yaw) / settings.full_stick_angular_speed,
-    )

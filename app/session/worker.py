@@ -1,5 +1,6 @@
 """What one worker process runs: set up, tell the web process, loop, close the log."""
 
+import contextlib
 import logging
 import os
 import signal
@@ -12,6 +13,7 @@ import viser
 
 from app.core import AssistanceSettings, preset
 from app.errors import AppError
+from app.recording.errors import RecordingError
 from app.recording.store import append_event, open_session
 from app.robot.scene_file import load_scene
 from app.session.channel import Channel
@@ -95,7 +97,8 @@ def _run(spec: WorkerSpec, channel: Channel, inbox: Inbox, pacer: Pacer) -> str:
     finally:
         recorder.close()
         if folder is not None:
-            append_event(folder, "worker_end", {"pid": os.getpid(), "reason": inbox.ended})
+            with contextlib.suppress(RecordingError):  # a disk that refuses has been told already
+                append_event(folder, "worker_end", {"pid": os.getpid(), "reason": inbox.ended})
     return inbox.ended
 
 

@@ -143,12 +143,15 @@ def test_lost_input_and_page_events_are_recorded(start: Start):
     live.until(push)
     live.send({"type": "clients", "control": None, "count": 0})
     live.status_where(lambda s: not any(s["direct"]))
+    live.send({"type": "clients", "control": "c1", "count": 1})
+    live.until(push)
     live.sock.shutdown(1)  # the web process is gone: the worker ends by itself
     assert live.finish() == 0
     log = read_trial(live.folder / "trial-001.mcap")
     names = [event.name for event in log.events]
-    for name in ("blur", "focus", "disconnect", "input_lost", "input_back"):
+    for name in ("blur", "focus", "disconnect", "reconnect", "input_lost", "input_back"):
         assert name in names
+    assert names.count("disconnect") == names.count("reconnect") == 1
     assert any('"blur"' in event.detail for event in log.events if event.name == "input_lost")
     assert log.summary is not None and log.summary.outcome == "aborted"
 
