@@ -69,7 +69,8 @@ def draw_value() -> Figure:
     _arrow(axes, position, direct, LIGHT["user"], "D(u)")
     _arrow(axes, position, step.twist, LIGHT["assist"], "a")
     axes.set_title("The value of one goal")
-    axes.legend(loc="lower right")
+    _hand(axes, position + settings.look_ahead * step.twist[:3], "x'", faint=True)
+    _legend(axes, "lower right")
     return figure
 
 
@@ -129,7 +130,7 @@ def draw_belief() -> Figure:
             _arrow(axes, start, direct, LIGHT["user"], "D(u)")
         _arrow(axes, start, step.twist, LIGHT["assist"], "executed")
         axes.set_title(f"1 s {title}")
-        axes.legend(loc="lower left")
+        _legend(axes, "lower left")
         bars.bar(goals.names, state.belief, color=GOAL_COLOURS)
         bars.set(ylim=(0.0, 1.0), ylabel="p(g)" if column == 0 else "")
     return figure
@@ -145,16 +146,16 @@ def draw_targets() -> Figure:
     quaternions = np.tile(DOWN, (16, 1))
     both = make_goals({"ball": (ring, quaternions)})
     single = [make_goals({"one": (ring[[k]], quaternions[[k]])}) for k in (6, 13)]
-    figure = Figure(figsize=(10.4, 2.9), layout="constrained")
+    figure = Figure(figsize=(10.4, 3.4), layout="constrained")
     panels = figure.subplots(1, 4)
     drawn = (
         ("V_κ, one target", single[0], "min"),
         ("V_κ, another", single[1], "min"),
-        ("V_g = min over 16", both, "min"),
-        ("V_g, soft-min over 16", both, "soft-min"),
+        ("V_g, min of 16", both, "min"),
+        ("V_g, soft-min of 16", both, "soft-min"),
     )
     for axes, (title, goals, kind) in zip(panels, drawn, strict=True):
-        _heat(figure, axes, _plane(settings, goals, np.ones(1), kind), "[nat]")
+        _heat(figure, axes, _plane(settings, goals, np.ones(1), kind), "[nat]", place="bottom")
         axes.plot(goals.positions[:, 0], goals.positions[:, 1], ".", ms=4, color=LIGHT["p2"])
         axes.set_title(title)
     return figure
@@ -209,14 +210,16 @@ def _plane(settings: object, goals: Goals, belief: Array, kind: str = "min") -> 
     )
 
 
-def _heat(figure: Figure, axes: Axes, grid: Array, label: str, bar: bool = True) -> None:
+def _heat(
+    figure: Figure, axes: Axes, grid: Array, label: str, bar: bool = True, place: str = "right"
+) -> None:
     extent = (0.0, 0.7, -0.35, 0.35)
     image = axes.imshow(
         grid.T, origin="lower", extent=extent, cmap=VALUES, interpolation="bilinear"
     )
     axes.contour(grid.T, levels=8, extent=extent, colors=LIGHT["panel"], linewidths=0.4)
     if bar:
-        figure.colorbar(image, ax=axes, label=label, shrink=0.85)
+        figure.colorbar(image, ax=axes, label=label, shrink=0.85, location=place)
     axes.grid(visible=False)
     axes.set(xlabel="x [m]", ylabel="y [m]")
 
@@ -232,7 +235,14 @@ def _hand(axes: Axes, position: Array, name: str = "", faint: bool = False) -> N
     alpha = 0.45 if faint else 1.0
     axes.plot(*position[:2], "s", ms=7, color=LIGHT["text"], mec=LIGHT["panel"], alpha=alpha)
     if name:
-        axes.annotate(name, (position[0], position[1]), (-10, -4), textcoords="offset points")
+        axes.annotate(
+            name,
+            (position[0], position[1]),
+            (0, -14),
+            textcoords="offset points",
+            ha="center",
+            color=LIGHT["panel"],
+        )
 
 
 def _arrow(axes: Axes, position: Array, twist: Array, colour: str, label: str) -> None:
@@ -245,5 +255,11 @@ def _arrow(axes: Axes, position: Array, twist: Array, colour: str, label: str) -
         scale_units="xy",
         scale=1.0,
         width=0.012,
-        zorder=3,
+        zorder=5 if label == "D(u)" else 4,
     )
+
+
+def _legend(axes: Axes, place: str) -> None:
+    """Add a legend that stays readable over a heat map."""
+    frame = axes.legend(frameon=True, facecolor=LIGHT["panel"], edgecolor="none", framealpha=0.9)
+    frame.set_loc(place)
