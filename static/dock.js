@@ -14,7 +14,7 @@ export function createDock(store, actions) {
   const menu = h("span", { class: "method-menu" }, select, icon("chevron"));
   const assist = h("button", { class: "toggle", type: "button", role: "switch", "aria-checked": "true", "data-testid": "assist-toggle", title: "Assistance (G)", on: { click: actions.toggleAssist } }, h("i"), "Assist");
   const options = h("button", { class: "btn", type: "button", id: "options", "data-testid": "options", "aria-expanded": "false", "aria-controls": "drawer", on: { click: () => store.update({ drawer: !store.state.drawer, menu: false }) } }, icon("gear"), h("span", {}, "Options"));
-  const next = h("button", { class: "btn", type: "button", "data-testid": "new-trial", title: "New trial (N)", on: { click: () => actions.newTrial() } }, icon("new"), h("span", {}, "New trial"));
+  const next = h("button", { class: "btn", type: "button", "data-testid": "new-trial", "aria-label": "New trial", title: "New trial (N)", on: { click: () => actions.newTrial() } }, icon("new"), h("span", {}, "New trial"));
   byId("dock").append(seg, menu, h("span", { class: "bar-v" }), assist, options, next);
 
   const grasp = byId("grasp");

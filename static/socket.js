@@ -85,6 +85,7 @@ export class Socket {
     } catch {
       return; // half a message of a dying worker; the next status says all
     }
+    if (typeof message !== "object" || message === null) return;
     if (message.type === "hello") {
       this.attempts = 0;
       this.listener.change({ state: "connected", before: true, retryAt: null, reason: "" });
