@@ -139,11 +139,24 @@ def _analyze(args: argparse.Namespace) -> None:
     print(analyze(args.folder, args.out, progress=lambda text: print(text, file=sys.stderr)))
 
 
+def _simulate_options(parser: Arguments) -> None:
+    from app.simulate.options import add_options
+
+    add_options(parser)
+
+
+def _simulate(args: argparse.Namespace) -> int:
+    from app.simulate.options import run
+
+    return run(args)
+
+
 COMMANDS: dict[str, Command] = {
     "run": Command("serve the live page (the default)", _run_options, _run),
     "sessions": Command("list recorded trials and their outcomes", _sessions_options, _sessions),
     "bench": Command("measure this machine", _bench_options, _bench),
     "figures": Command("draw the method from the running code", _figures_options, _figures),
+    "simulate": Command("run studies with simulated users", _simulate_options, _simulate),
     "analyze": Command("report on a folder of trials", _analyze_options, _analyze),
 }
 

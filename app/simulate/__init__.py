@@ -1,1 +1,1 @@
-"""Simulated users and whole simulated studies."""
+"""Studies with simulated users: the same assistance, the same tick, the same measures as live."""
