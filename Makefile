@@ -7,7 +7,7 @@ ARGS ?=
 # Two workers suit two cores; the browser tests of one file stay together.
 PYTEST := $(BIN)/pytest -n 2 --dist loadfile
 
-.PHONY: run install test test-all check format lock browser clean
+.PHONY: run install plots test test-all check format lock browser clean
 
 run: $(STAMP)  ## start the server on 127.0.0.1:8080
 	$(BIN)/hindsight run --open $(ARGS)
@@ -22,7 +22,11 @@ $(STAMP): requirements.lock pyproject.toml
 	@echo "Installing the locked packages into $(VENV) (a minute or two, once) …"
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+	@$(BIN)/python -m app.web.vendor
 	@touch $@
+
+plots: $(STAMP)  ## fetch the review page's plotting library again (needs the network)
+	@$(BIN)/python -m app.web.vendor
 
 browser: $(STAMP)  ## find or install a Chromium for the browser tests
 	@$(BIN)/python tests/find_browser.py
