@@ -34,9 +34,7 @@ def plan_from_folder(
         )
     pair = contrast or choose_contrast(methods, data.contrast)
     if pair is None:
-        raise AnalysisError(
-            f"{folder} holds counted trials of {len(methods)} methods; 2 are needed"
-        )
+        raise AnalysisError(f"{folder}: counted trials of {len(methods)} methods; 2 are needed")
     plans = []
     for measure, label in LABELS.items():
         _, means = make_cells(trials, measure).of_methods(*pair).balanced_means()

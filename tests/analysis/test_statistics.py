@@ -156,6 +156,15 @@ def test_exact_ranks_count_sign_patterns() -> None:
     assert tied.p == pytest.approx(2 / 32) and tied.ties == 3
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_exact_ranks_agree_with_scipys_permutations(seed: int) -> None:
+    """With ties and zeros, p is what scipy finds by visiting the sign patterns one by one."""
+    d = np.random.default_rng(seed).integers(-3, 4, size=9).astype(float)
+    nonzero = d[d != 0]
+    expected = stats.wilcoxon(nonzero, method=stats.PermutationMethod())  # type: ignore[arg-type]
+    assert signed_rank(d).p == pytest.approx(float(expected[1]))  # type: ignore[arg-type]
+
+
 def test_ranks_without_differences_say_why() -> None:
     """All zero, or nobody there: no p and a reason."""
     assert signed_rank(np.zeros(4)).note == "every difference is zero"
