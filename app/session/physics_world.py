@@ -31,18 +31,21 @@ class PhysicsWorld:
     joint_names = JOINT_NAMES
     physics_dt_s = PHYSICS_DT
 
-    def __init__(self, scene: Scene, seed: int | None = None) -> None:
+    def __init__(
+        self, scene: Scene, seed: int | None = None, simulation: Simulation | None = None
+    ) -> None:
         """Build the world and put everything at its start.
 
         Args:
             scene: What to simulate.
             seed: Draws which object stands where; None: the scene's default.
+            simulation: Of this scene, to be used instead of a new one.
 
         Raises:
             GraspError: If an object cannot be grasped.
         """
         self.scene = scene
-        self.simulation = Simulation(scene)
+        self.simulation = simulation or Simulation(scene)
         self._kinematics = Kinematics(scene)
         self._servo = Servo(self.simulation.joint_positions)
         self._tracker = GoalTracker(scene)
