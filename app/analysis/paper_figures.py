@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -259,7 +260,7 @@ def _arrow(axes: Axes, position: Array, twist: Array, colour: str, label: str) -
     )
 
 
-def _legend(axes: Axes, place: str) -> None:
+def _legend(axes: Axes, place: Literal["lower left", "lower right"]) -> None:
     """Add a legend that stays readable over a heat map."""
     frame = axes.legend(frameon=True, facecolor=LIGHT["panel"], edgecolor="none", framealpha=0.9)
     frame.set_loc(place)
