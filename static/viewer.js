@@ -8,6 +8,29 @@ function apply(m, [x, y, z, w]) {
   return [0, 1, 2, 3].map((i) => m[i] * x + m[i + 4] * y + m[i + 8] * z + m[i + 12] * w);
 }
 
+const PLAIN = "&antialias=0&shadows=0&surroundings=0&fixedDpr=0.6";
+
+/** Whether WebGL here is drawn by the processor, at a few frames a second with all there is to draw. */
+function drawsInSoftware() {
+  const gl = document.createElement("canvas").getContext("webgl");
+  if (!gl) return true;
+  const info = gl.getExtension("WEBGL_debug_renderer_info");
+  const renderer = String(gl.getParameter(info ? info.UNMASKED_RENDERER_WEBGL : gl.RENDERER));
+  gl.getExtension("WEBGL_lose_context")?.loseContext();
+  return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(renderer);
+}
+
+/**
+ * What to leave out of the picture: nothing, or what a browser without a graphics card cannot keep
+ * up with (shadows, reflections, floor, fine pixels). `?detail=full` and `?detail=plain` overrule.
+ * @param {string} search the page's own query
+ */
+function leftOut(search) {
+  const asked = new URLSearchParams(search).get("detail");
+  const plain = asked === "plain" || (asked !== "full" && drawsInSoftware());
+  return plain ? PLAIN : "";
+}
+
 export class Viewer {
   /** @param {HTMLIFrameElement} frame */
   constructor(frame) {
@@ -19,12 +42,7 @@ export class Viewer {
   open(path) {
     if (path === this.path || !/^\/[^/\\]/.test(path)) return;
     this.path = path;
-    this.frame.src = `${path}?hideViserLogo`;
-  }
-
-  /** Fetch the picture anew, for one whose robot was replaced. */
-  reload() {
-    this.frame.src = this.frame.src;
+    this.frame.src = `${path}?hideViserLogo${leftOut(location.search)}`;
   }
 
   get window() {

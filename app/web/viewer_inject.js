@@ -44,9 +44,10 @@
   addEventListener("keydown", forward, true);
   addEventListener("keyup", forward, true);
 
-  // Switches for software GL (browser tests, weak machines): ?antialias=0 and ?shadows=0.
+  // What a browser without a graphics card leaves out: ?antialias=0, ?shadows=0, ?surroundings=0.
   const plain = query.get("antialias") === "0";
   const shadowless = query.get("shadows") === "0";
+  const bare = query.get("surroundings") === "0";
   if (plain) {
     for (const Canvas of [HTMLCanvasElement, globalThis.OffscreenCanvas]) {
       if (!Canvas) continue;
@@ -57,11 +58,23 @@
       };
     }
   }
-  if (shadowless) {
+  const leaveOut = (scene) => {
+    if (bare) {
+      scene.environment = null;
+      const floor = globalThis.__viserMutable.nodeRefFromName["/hindsight/floor"];
+      if (floor) floor.visible = false;
+    }
+    scene.traverse((node) => {
+      if (shadowless && node.isLight) node.castShadow = false;
+      // The sky stands in for the reflections of the surroundings.
+      if (bare && node.isHemisphereLight) node.intensity = Math.max(node.intensity, 1.6);
+    });
+  };
+  if (shadowless || bare) {
     // Lights come and go with the scene, so look again now and then.
     setInterval(() => {
       const scene = globalThis.__viserMutable && globalThis.__viserMutable.scene;
-      if (scene) scene.traverse((node) => { if (node.isLight) node.castShadow = false; });
+      if (scene) leaveOut(scene);
     }, 250);
   }
 })();

@@ -59,6 +59,15 @@ def test_the_figures_of_the_status_reach_the_document(fake: FakeServer, open_pag
     )
 
 
+def test_software_drawing_is_found_and_spared(open_page: OpenPage):
+    """This browser draws in software: the picture leaves out what costs most, unless asked."""
+    view = "/view/test-session/?hideViserLogo"
+    spared = f"{view}&antialias=0&shadows=0&surroundings=0&fixedDpr=0.6"
+    expect(open_page("?websocket=evil").get_by_test_id("viewer")).to_have_attribute("src", spared)
+    expect(open_page("?detail=plain").get_by_test_id("viewer")).to_have_attribute("src", spared)
+    expect(open_page("?detail=full").get_by_test_id("viewer")).to_have_attribute("src", view)
+
+
 def test_hidden_figures_leave_no_trace(fake: FakeServer, open_page: OpenPage):
     """A study's status may lack belief, method, positions: the page shows none and goes on."""
     page = open_page()
