@@ -8,10 +8,12 @@ import numpy as np
 
 from app.core.measures import calibration_counts, compute_measures
 from app.session.commands import Command
+from app.session.tick import Tick
 from app.session.trial import CONTROL_DT_S, Trial
 from app.session.worlds import World
 from app.simulate.methods import MethodSpec
-from app.simulate.models import MODELS, Sight
+from app.simulate.models import MODELS, Action, Sight
+from app.simulate.models.base import DECISION_TICKS, REST
 from app.simulate.plan import Assignment, Study, assign
 from app.simulate.worlds import HidingWorld, make_world
 
@@ -21,6 +23,7 @@ Row = dict[str, Any]
 STUDY_NAME = "simulated"
 _GRASP = (Command("grasp"),)
 CALIBRATION_BINS = 10
+_COLUMNS = ("phase", "input_norm", *(f"{name}_twist" for name in Tick._fields[2:5]), "belief")
 
 
 class Runner:
@@ -51,7 +54,7 @@ def run_trial(world: World, preset: str, method: MethodSpec, assignment: Assignm
     world.reset(assignment.layout_seed)
     model = MODELS[assignment.model]
     rng = np.random.default_rng(assignment.noise_seed)
-    user = model(assignment.goal, assignment.parameters, rng, CONTROL_DT_S)
+    user = model(assignment.goal, assignment.parameters, rng)
     seen: Any = world if model.MODELLED else HidingWorld(world, assignment.goal)
     trial = Trial(
         seen,
@@ -62,34 +65,25 @@ def run_trial(world: World, preset: str, method: MethodSpec, assignment: Assignm
         start_delay_s=0.0,
         with_known_goal=False,
     )
-    columns: dict[str, list[Any]] = {name: [] for name in _COLUMNS}
+    ticks: list[Tick] = []
+    action = Action(REST)
     while trial.phase != "done":
         commands: tuple[Command, ...] = ()
-        action = user.act(Sight(trial.tick, trial.time_s, world.hand_pose(), world.goals()))
-        if action.close and trial.phase == "running":
-            commands = _GRASP
-        record = trial.step(action.input, commands)
-        for name, column in columns.items():
-            column.append(getattr(record, name))
-    return _measure(trial, columns, model.MODELLED)
+        if trial.tick % DECISION_TICKS == 0:
+            action = user.act(Sight(trial.time_s, world.hand_pose(), world.goals()))
+            if action.close and trial.phase == "running":
+                commands = _GRASP
+        ticks.append(trial.advance(action.input, commands))
+    return _measure(trial, ticks, model.MODELLED)
 
 
-_COLUMNS = (
-    "phase",
-    "input_norm",
-    "direct_twist",
-    "assistance_twist",
-    "executed_twist",
-    "belief",
-)
-
-
-def _measure(trial: Trial, columns: dict[str, list[Any]], modelled: bool) -> Row:
+def _measure(trial: Trial, ticks: list[Tick], modelled: bool) -> Row:
+    columns = dict(zip(_COLUMNS, map(np.asarray, zip(*ticks, strict=True)), strict=True))
     names = trial.goals.names
     goal = names.index(trial.goal) if modelled else None
     measures = compute_measures(columns, true_goal=goal, dt=CONTROL_DT_S)
-    running = np.asarray(columns["phase"]) == "running"
-    belief = np.asarray(columns["belief"])
+    running = columns["phase"] == "running"
+    belief = columns["belief"]
     counts = None
     if goal is not None and running.any():
         counts = np.concatenate(calibration_counts(belief[running], goal, CALIBRATION_BINS))

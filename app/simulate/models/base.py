@@ -20,7 +20,8 @@ from app.simulate.models.parameters import COMMON, Parameter
 
 DECISION_TICKS = 4
 """Ticks between two decisions: sticks are moved 25 times a second, and held in between."""
-_VELOCITY_TICKS = 10  # over which motion is seen
+DECISION_S = 0.04
+_VELOCITY_LOOKS = 3  # decisions over which motion is seen
 _METRES_PER_RADIAN = 0.1  # an angle of 0.1 rad is as far off as 10 mm
 _LOYALTY_M = 0.01  # another grasp must be nearer by this to be preferred
 
@@ -30,13 +31,11 @@ class Sight:
     """What there is to see in a tick.
 
     Attributes:
-        tick: Since the start signal.
         time_s: Since the start signal [s].
         pose: The hand's, world frame.
         goals: Every object with its grasps, world frame, whether the assistance models it or not.
     """
 
-    tick: int
     time_s: float
     pose: Pose
     goals: Goals
@@ -99,7 +98,7 @@ class User(ABC):
     """Whether the user's goal is among those the assistance knows."""
 
     def __init__(
-        self, goal: str, parameters: Mapping[str, float], rng: np.random.Generator, dt: float
+        self, goal: str, parameters: Mapping[str, float], rng: np.random.Generator
     ) -> None:
         """Begin a trial.
 
@@ -107,35 +106,31 @@ class User(ABC):
             goal: The instructed object.
             parameters: Value of every one of PARAMETERS.
             rng: Source of this trial's noise, for this user alone.
-            dt: Length of a tick [s].
         """
         self.goal = goal
         self.p = parameters
         self._rng = rng
-        self._late_ticks = round(parameters["delay_s"] / dt)
-        self._velocity_s = _VELOCITY_TICKS * dt
-        self._seen: deque[Pose] = deque(maxlen=self._late_ticks + _VELOCITY_TICKS + 1)
-        self._kept = float(np.exp(-DECISION_TICKS * dt / parameters["noise_time_s"]))
+        self._late = round(parameters["delay_s"] / DECISION_S)
+        self._seen: deque[Pose] = deque(maxlen=self._late + _VELOCITY_LOOKS + 1)
+        self._looks = 0
+        self._kept = float(np.exp(-DECISION_S / parameters["noise_time_s"]))
         self._fresh = float(np.sqrt(1.0 - self._kept**2))
         self._noise = rng.standard_normal(3)
-        self._patience = round(parameters["patience_s"] / (DECISION_TICKS * dt))
+        self._patience = round(parameters["patience_s"] / DECISION_S)
         self._at_grasp = 0
         self._grasp = -1
         self._axis = -1
-        self._action = Action(REST)
 
     @abstractmethod
     def intend(self, percept: Percept) -> Array:
         """The input the user means to give, per world axis, full stick = 1, shape (3,)."""
 
     def act(self, sight: Sight) -> Action:
-        """What the user does in this tick."""
+        """Look and decide; called every DECISION_TICKS, the sticks are held in between."""
         self._seen.append(sight.pose)
-        if sight.tick % DECISION_TICKS:
-            return self._action
+        self._looks += 1
         self._noise = self._kept * self._noise + self._fresh * self._rng.standard_normal(3)
-        self._action = self._decide(sight) if sight.tick >= self._late_ticks else Action(REST)
-        return self._action
+        return self._decide(sight) if self._looks > self._late else Action(REST)
 
     def _decide(self, sight: Sight) -> Action:
         percept = self._perceive(sight)
@@ -150,10 +145,10 @@ class User(ABC):
 
     def _perceive(self, sight: Sight) -> Percept:
         seen = self._seen
-        now = max(0, len(seen) - 1 - self._late_ticks)
-        before = max(0, now - _VELOCITY_TICKS)
+        now = len(seen) - 1 - self._late
+        before = max(0, now - _VELOCITY_LOOKS)
         pose = seen[now]
-        velocity = (pose.position - seen[before].position) / self._velocity_s
+        velocity = (pose.position - seen[before].position) / (_VELOCITY_LOOKS * DECISION_S)
         row = sight.goals.names.index(self.goal)
         start, stop = sight.goals.offsets[row], sight.goals.offsets[row + 1]
         positions = sight.goals.positions[start:stop]

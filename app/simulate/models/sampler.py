@@ -5,7 +5,7 @@ import numpy as np
 from app.core import AssistanceSettings
 from app.core.types import Array
 from app.core.values import rotation_cost, translation_cost, value
-from app.simulate.models.base import DECISION_TICKS, Percept, User
+from app.simulate.models.base import DECISION_S, Percept, User
 from app.simulate.models.parameters import COMMON, Parameter
 
 _COSTS = AssistanceSettings()
@@ -39,7 +39,7 @@ class MaxEnt(User):
         uniform = float(self._rng.random())
         if self._left <= 0:
             self._held = self._sample(percept, uniform)
-            self._left = max(1, round(self.p["hold_s"] / (0.01 * DECISION_TICKS)))
+            self._left = max(1, round(self.p["hold_s"] / DECISION_S))
         self._left -= 1
         return self._held
 
