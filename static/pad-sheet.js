@@ -130,7 +130,9 @@ export function createPadSheet(gamepads) {
     const state = pad ? `${gamepads.list().map((one) => one.index + one.id).join()}|${pad.index}` : "none";
     if (state !== shown) {
       shown = state;
+      const focused = document.activeElement?.getAttribute("aria-label");
       body.replaceChildren(...(pad ? build(pad) : [h("p", { class: "hint" }, "No gamepad yet. Plug one in and press any of its buttons.")]));
+      if (focused) /** @type {HTMLElement|null} */ (body.querySelector(`[aria-label="${CSS.escape(focused)}"]`))?.focus();
     }
     if (pad && waiting?.(pad)) waiting = null;
   };
