@@ -44,6 +44,18 @@ class Backend(Protocol):
         """Evaluate and condition the belief."""
         ...
 
+    def descend(
+        self,
+        settings: AssistanceSettings,
+        towards: Array,
+        offsets: Rows,
+        rotation_values: Array,
+        belief: Array,
+        starts: Array,
+    ) -> Array:
+        """Minimise the policy's objective over the translation."""
+        ...
+
     def fill_grid(
         self,
         settings: AssistanceSettings,

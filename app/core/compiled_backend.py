@@ -6,12 +6,13 @@ a fraction of one from the cache).
 
 import numpy as np
 
-from app.core import kernels
+from app.core import exact_kernel, kernels
 from app.core.belief import Evidence
+from app.core.exact import PASSES, TOLERANCE
 from app.core.settings import AssistanceSettings
 from app.core.types import Array, Goals, Rows
 
-__all__ = ["NAME", "evaluate", "fill_grid", "update"]
+__all__ = ["NAME", "descend", "evaluate", "fill_grid", "update"]
 
 NAME: str = "compiled"
 
@@ -102,6 +103,31 @@ def fill_grid(
         np.empty((2, grid.shape[1])),
         grid,
     )
+
+
+def descend(
+    settings: AssistanceSettings,
+    towards: Array,
+    offsets: Rows,
+    rotation_values: Array,
+    belief: Array,
+    starts: Array,
+) -> Array:
+    """`exact.descend`."""
+    best = np.empty(3)
+    exact_kernel.descend(
+        settings.packed,
+        np.ascontiguousarray(towards),
+        np.array(offsets, dtype=np.int64),
+        rotation_values,
+        np.array(belief),
+        settings.w_translation,
+        PASSES,
+        TOLERANCE,
+        starts,
+        best,
+    )
+    return best
 
 
 def _contiguous(goals: Goals) -> Goals:

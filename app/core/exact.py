@@ -7,73 +7,71 @@ y = p + τD(u), s the assistance's velocity. With one target a goal the objectiv
 iterated converges to its minimum: each pass minimises a quadratic that lies above the objective
 and touches it at s (V is concave in d², and V_g ≤ V_κ for the target chosen). With many targets
 the objective is not convex; the iteration is restarted from the nearest targets of the likeliest
-goals and the best end is taken.
+goals and the best end is taken. `exact_kernel.py` holds the descent compiled.
 """
 
 import numpy as np
 
-from app.core.rotations import from_rotation_vector, multiply, rotation_between
-from app.core.situation import Situation
+from app.core.settings import AssistanceSettings
 from app.core.types import Array, Rows
-from app.core.values import cost_rate, rotation_cost, translation_cost, value
+from app.core.values import cost_rate, translation_cost, value
 
-RESTART_GOALS = 4  # likeliest goals a restart is made for
-RESTART_TARGETS = 3  # nearest targets of each
-SHORT_OF_TARGET = 0.9  # a start at the target itself would never leave the kink of c₀ d there
-MAX_PASSES = 200
-TOLERANCE = 1e-13  # [m/s]
+PASSES = 200
+TOLERANCE = 1e-14  # [m/s]
 
 
-def exact_step(situation: Situation) -> Array:
-    """Return the velocity s that minimises the objective [m/s], shape (3,)."""
-    settings, goals, x = situation.settings, situation.goals, situation.x
+def descend(
+    settings: AssistanceSettings,
+    towards: Array,
+    offsets: Rows,
+    rotation_values: Array,
+    belief: Array,
+    starts: Array,
+) -> Array:
+    """Return the best end of the iteration from all starts, a velocity [m/s], shape (3,).
+
+    Args:
+        settings: Costs, τ and w.
+        towards: P_κ − y, from the hand after D(u) to every target [m], shape (n_targets, 3).
+        offsets: First target of each goal and the end, shape (n_goals + 1,).
+        rotation_values: m V_r of every target [nat], shape (n_targets,).
+        belief: b(g), shape (n_goals,).
+        starts: Velocities to start from [m/s], shape (n_starts, 3).
+    """
     tau, w = settings.look_ahead, settings.w_translation
     cost = translation_cost(settings)
-    y = x[:3] + tau * x[7:10]
-    turned = multiply(from_rotation_vector(tau * x[10:]), x[3:7])
-    angles, _ = rotation_between(goals.quaternions, turned)
-    rotation_values = settings.rotation_weight * value(angles, rotation_cost(settings))
-    towards = goals.positions - y
-
-    s = _starts(situation, towards)
-    chosen = np.empty((len(s), goals.n_goals), dtype=np.int64)
-    for _ in range(MAX_PASSES):
-        expected = _choose(situation, s, towards, rotation_values, chosen)
+    s = starts
+    for _ in range(PASSES):
+        chosen, _ = _choose(settings, towards, offsets, rotation_values, belief, s)
         d = np.linalg.norm(towards[chosen] - tau * s[:, None, :], axis=2)
-        k = situation.belief * cost_rate(d, cost) / (cost.speed * np.maximum(d, 1e-12))
+        k = belief * cost_rate(d, cost) / (cost.speed * np.maximum(d, 1e-12))
         following = np.einsum("sg,sgi->si", k, towards[chosen])
         following /= (2.0 * w + tau * k.sum(axis=1))[:, None]
         moved = np.abs(following - s).max()
-        s = following
         if moved < TOLERANCE:
             break
-    expected = _choose(situation, s, towards, rotation_values, chosen)
+        s = following
+    _, expected = _choose(settings, towards, offsets, rotation_values, belief, s)
     objective = tau * w * (s**2).sum(axis=1) + expected
     return s[int(np.argmin(objective))]
 
 
-def _starts(situation: Situation, towards: Array) -> Array:
-    """Return velocities to start from: none, first order, and into the nearest targets, (n, 3)."""
-    settings, offsets = situation.settings, situation.goals.offsets
-    starts = [np.zeros(3), -situation.expected_gradient[:3] / (2.0 * settings.w_translation)]
-    for goal in np.argsort(-situation.belief, kind="stable")[:RESTART_GOALS]:
-        own = towards[offsets[goal] : offsets[goal + 1]]
-        nearest = np.argsort((own**2).sum(axis=1), kind="stable")[:RESTART_TARGETS]
-        starts.extend(SHORT_OF_TARGET / settings.look_ahead * own[nearest])
-    return np.array(starts)
-
-
 def _choose(
-    situation: Situation, s: Array, towards: Array, rotation_values: Array, chosen: Rows
-) -> Array:
-    """Fill `chosen` with each goal's best target after s; return Σ b V there, shape (n_starts,)."""
-    settings, offsets = situation.settings, situation.goals.offsets
+    settings: AssistanceSettings,
+    towards: Array,
+    offsets: Rows,
+    rotation_values: Array,
+    belief: Array,
+    s: Array,
+) -> tuple[Rows, Array]:
+    """Return each goal's best target after s, (n_starts, n_goals), and Σ b V there, (n_starts,)."""
     distance = np.linalg.norm(towards - settings.look_ahead * s[:, None, :], axis=2)
     values = value(distance, translation_cost(settings)) + rotation_values
+    chosen = np.empty((len(s), len(belief)), dtype=np.int64)
     expected = np.zeros(len(s))
-    for goal, weight in enumerate(situation.belief):
+    for goal, weight in enumerate(belief):
         own = values[:, offsets[goal] : offsets[goal + 1]]
         best = own.argmin(axis=1)
         chosen[:, goal] = offsets[goal] + best
         expected += weight * own[np.arange(len(s)), best]
-    return expected
+    return chosen, expected

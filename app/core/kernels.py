@@ -17,7 +17,7 @@ _VECTOR, _MATRIX, _ROWS = float64[::1], float64[:, ::1], int64[::1]
 _SOFT_MIN_REACH = 40.0  # exp(−40) of a term is below the rounding of the sum
 
 
-def _kernel(signature: Any) -> Callable[[Callable], Any]:
+def compile_kernel(signature: Any) -> Callable[[Callable], Any]:
     """Compile for exactly these types now; without the cache where no folder can be written."""
 
     def decorate(function: Callable) -> Any:
@@ -29,7 +29,7 @@ def _kernel(signature: Any) -> Callable[[Callable], Any]:
     return decorate
 
 
-@_kernel(float64(float64, float64, float64, float64, float64))
+@compile_kernel(float64(float64, float64, float64, float64, float64))
 def value(d, alpha, delta, offset, speed):
     """V(d), `values.value`."""
     if d > delta:
@@ -37,13 +37,13 @@ def value(d, alpha, delta, offset, speed):
     return (0.5 * alpha / delta * d * d + offset * d) / speed
 
 
-@_kernel(float64(float64, float64, float64, float64))
+@compile_kernel(float64(float64, float64, float64, float64))
 def cost_rate(d, alpha, delta, offset):
     """C(d), `values.cost_rate`."""
     return alpha * min(1.0, d / delta) + offset
 
 
-@_kernel(float64(float64, float64))
+@compile_kernel(float64(float64, float64))
 def angle(cosine, sine):
     """Angle r from |cos(r/2)| and sin(r/2) ≥ 0, accurate near 0 and near π."""
     if sine < cosine:
@@ -51,7 +51,7 @@ def angle(cosine, sine):
     return 2.0 * math.acos(min(cosine, 1.0))
 
 
-@_kernel(float64(_MATRIX, int64, float64, float64, float64, float64))
+@compile_kernel(float64(_MATRIX, int64, float64, float64, float64, float64))
 def angle_to(quaternions, k, w, x, y, z):
     """Angle between target k's orientation and (w, x, y, z), `rotations.rotation_between`."""
     kw, kx, ky, kz = quaternions[k, 0], quaternions[k, 1], quaternions[k, 2], quaternions[k, 3]
@@ -64,7 +64,7 @@ def angle_to(quaternions, k, w, x, y, z):
     return angle(cosine, math.sqrt(nx * nx + ny * ny + nz * nz))
 
 
-@_kernel(numba.boolean(_VECTOR, _MATRIX, _MATRIX, _ROWS, _VECTOR, _MATRIX, _ROWS))
+@compile_kernel(numba.boolean(_VECTOR, _MATRIX, _MATRIX, _ROWS, _VECTOR, _MATRIX, _ROWS))
 def evaluate(packed, positions, quaternions, offsets, x, rows, best_targets):
     """Fill rows 0…11 and the best targets, `evaluation.evaluate`; False where input is not valid.
 
@@ -184,7 +184,7 @@ def evaluate(packed, positions, quaternions, offsets, x, rows, best_targets):
     return True
 
 
-@_kernel(float64(_VECTOR, int64))
+@compile_kernel(float64(_VECTOR, int64))
 def log_sum_exp(values, skip):
     """Return log Σ exp(values) over all but row `skip` (−1: all)."""
     top = -math.inf
@@ -198,7 +198,7 @@ def log_sum_exp(values, skip):
     return top + math.log(total)
 
 
-@_kernel(numba.void(_VECTOR, float64, float64, numba.boolean))
+@compile_kernel(numba.void(_VECTOR, float64, float64, numba.boolean))
 def bound(log_b, highest, lowest, equal):
     """Normalise and bound log b(g) in place, `belief.bounded`."""
     n = log_b.shape[0]
@@ -243,7 +243,7 @@ def bound(log_b, highest, lowest, equal):
         log_b[top] = math.log(highest)
 
 
-@_kernel(
+@compile_kernel(
     numba.boolean(
         *(_VECTOR, _MATRIX, _MATRIX, _ROWS, _VECTOR, _VECTOR, _VECTOR),
         *(float64, float64, float64, _MATRIX, _ROWS, _VECTOR),
@@ -290,7 +290,7 @@ def update(
     return True
 
 
-@_kernel(
+@compile_kernel(
     numba.void(
         *(_VECTOR, _MATRIX, _ROWS, _VECTOR, _VECTOR, _VECTOR),
         *(_VECTOR, _VECTOR, float64, _MATRIX, _MATRIX),

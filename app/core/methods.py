@@ -13,7 +13,7 @@ from app.core.arbitration import ARBITRATIONS
 from app.core.backend import active
 from app.core.both_act import both_act_step
 from app.core.evaluation import GRADIENT, N_ROWS
-from app.core.exact import exact_step
+from app.core.exact_step import exact_step
 from app.core.situation import Situation
 from app.core.types import Array
 from app.core.yielding import give_way

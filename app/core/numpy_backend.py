@@ -5,11 +5,12 @@ import numpy as np
 from app.core.belief import Evidence, condition
 from app.core.checks import SMALLEST_QUATERNION
 from app.core.evaluation import BELIEF, GRADIENT, evaluate, soft_min
+from app.core.exact import descend
 from app.core.settings import AssistanceSettings
 from app.core.types import Array, Goals, Rows
 from app.core.values import translation_cost, value
 
-__all__ = ["NAME", "evaluate", "fill_grid", "update"]
+__all__ = ["NAME", "descend", "evaluate", "fill_grid", "update"]
 
 NAME: str = "numpy"
 

@@ -26,6 +26,7 @@ VARIANTS = [
     preset("paper"),
     preset("ada"),
     preset("ada", temperature=0.5),
+    preset("ada", step="exact", w_translation=5.0),
 ]
 FIELDS = ("direct", "assistance", "twist", "belief", "values", "q_values", "best_targets")
 
