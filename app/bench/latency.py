@@ -26,6 +26,14 @@ WebSocket.prototype.send = function (data) {
   return send.call(this, data);
 };
 """
+UNTIL_DRAWN = """
+async () => {
+  const view = document.querySelector('[data-testid="viewer"]');
+  while (!view.contentWindow?.__viserMutable?.nodePoseData?.['/probe']) {
+    await new Promise((done) => setTimeout(done, 100));
+  }
+}
+"""
 MEASURE = """
 async (moves) => {
   const frame = () => new Promise(requestAnimationFrame);
@@ -87,11 +95,7 @@ def bench_latency() -> dict[str, dict[str, Any]]:
                 page.add_init_script(WATCH_SOCKET)
                 page.goto(f"{url}/?method=direct")
                 page.wait_for_selector('[data-testid="connection"][data-state="connected"]')
-                page.wait_for_function(
-                    "document.querySelector('[data-testid=viewer]').contentWindow"
-                    ".__viserMutable?.nodePoseData?.['/probe'] !== undefined",
-                    timeout=60_000,
-                )
+                page.evaluate(UNTIL_DRAWN)
                 page.wait_for_timeout(2000)
                 latencies = page.evaluate(MEASURE, N_MOVES)
         finally:

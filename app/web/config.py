@@ -10,6 +10,8 @@ from urllib.parse import urlsplit
 from app.errors import AppError
 
 LOOPBACK_HOSTS = ("127.0.0.1", "::1", "localhost")
+LIVE_TIMEOUT_S = 300.0
+"""A live trial ends after this long [s]: time to look around, and an end for a page left open."""
 
 
 class ConfigError(AppError):
@@ -109,7 +111,11 @@ class ServerConfig:
             sessions=Path(args.sessions),
             scene=args.scene,
             settings={"preset": args.preset, "method": args.method},
-            options={"record": not args.no_record, "hold_on_loss": args.hold_on_loss},
+            options={
+                "record": not args.no_record,
+                "hold_on_loss": args.hold_on_loss,
+                "timeout_s": LIVE_TIMEOUT_S,
+            },
             public_origin=(args.behind_tls_proxy or "").rstrip("/"),
             capacity=capacity,
             retention_days=args.retention_days or 0.0,

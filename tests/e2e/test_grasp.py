@@ -17,7 +17,7 @@ def start(page: Page, target: str) -> None:
     page.wait_for_selector(
         f'[data-testid="trial"][data-target="{target}"][data-outcome="running"]', timeout=60_000
     )
-    page.wait_for_function("document.querySelector('[data-testid=hand]').dataset.x !== undefined")
+    page.wait_for_selector('[data-testid="hand"][data-x]', state="attached")
     page.evaluate(DRIVER)
 
 
