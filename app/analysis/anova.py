@@ -110,7 +110,8 @@ def _analyse(
     worst = float("nan")
     if np.isfinite(ours).all():
         long, within = _to_long(values), ["first", "second"][: len(factors)]
-        tables["pingouin"] = _by_pingouin(long, within)
+        if n > 2:  # with two, pingouin's test of sphericity divides by zero
+            tables["pingouin"] = _by_pingouin(long, within)
         if values.size <= ANOVA_RM_LIMIT:
             tables["statsmodels"] = _by_statsmodels(long, within)
         scale = np.maximum(np.abs(ours), 1e-9)

@@ -15,8 +15,9 @@ def draw_explored(explored: list[Explored]) -> Figure:
     columns = min(3, max(1, len(explored)))
     rows = max(1, -(-len(explored) // columns))
     methods = order_methods({m for e in explored for m in e.means})
-    height = 0.34 * max(2, len(methods)) + 0.75
-    figure = Figure(figsize=(7.2, rows * height), layout="constrained")
+    height = 0.34 * max(2, len(methods)) + 0.85
+    figure = Figure(figsize=(7.2, rows * height))
+    figure.set_layout_engine("constrained", h_pad=0.09)
     grid = np.atleast_1d(figure.subplots(rows, columns, squeeze=False)).ravel()
     colours = method_colours(methods)
     for axes, item in zip(grid, explored, strict=False):
@@ -32,6 +33,7 @@ def draw_explored(explored: list[Explored]) -> Figure:
                     capsize=3,
                     ms=6,
                 )
+        axes.margins(x=0.12)
         first = axes in grid[::columns]
         axes.set_yticks([-i for i in range(len(methods))], methods if first else [])
         axes.set_ylim(-len(methods) + 0.4, 0.6)
@@ -109,10 +111,11 @@ def _draw_learning(axes: Axes, rows: Frame, measure: str, label: str) -> None:
     last = int(rows["nth"].max())
     if last <= 12:
         axes.set_xticks(range(1, last + 1))
-    axes.set_ylim(bottom=0)
+    top = (table["mean"] + (table["std"] / table["size"] ** 0.5).fillna(0.0)).max()
+    axes.set_ylim(0.0, 1.1 * float(top) if top > 0 else 1.0)
     axes.set_xlabel("counted trial with the method")
     axes.set_ylabel(f"{label}, mean ± SE")
-    axes.legend(ncols=2)
+    axes.legend(ncols=2, loc="lower left")
 
 
 def draw_link(trials: Frame) -> Figure | None:

@@ -30,6 +30,7 @@ def interval(low: float, high: float, digits: int = 2) -> str:
 
 
 def mean_and_sd(mean: float, sd: float) -> str:
-    """A mean ± SD with as many digits as a measure of that size needs."""
-    digits = 1 if abs(mean) >= 10 else 2 if abs(mean) >= 0.1 else 4
+    """A mean ± SD, both with the digits that the SD leaves a meaning to."""
+    size = sd if np.isfinite(sd) and sd > 0 else abs(mean)
+    digits = next((d for d, low in ((1, 1.0), (2, 0.1), (3, 0.001)) if size >= low), 4)
     return f"{number(mean, digits)} ± {number(sd, digits)}"

@@ -92,6 +92,15 @@ def test_a_missing_cell_drops_its_participant_and_says_who() -> None:
     assert means[row] == pytest.approx(values[2, :, 1:].mean(axis=1))
 
 
+@pytest.mark.parametrize("n", [2, 3, 4])
+def test_few_participants_still_have_an_f(n: int) -> None:
+    """As few as two: F without a test of sphericity, nothing raised or warned of."""
+    values = np.random.default_rng(n).normal(10.0, 1.0, size=(n, 3, 3))
+    found = two_way(make_cells(values))
+    assert found.n == n and all(math.isfinite(e.f) for e in found.effects)
+    assert found.agreement < 1e-8
+
+
 def test_equal_differences_have_no_f() -> None:
     """Everyone exactly 1 s faster: no error variance, F undefined, nothing raised."""
     values = np.random.default_rng(0).normal(size=(5, 1, 3)) + np.array([[[0.0]], [[1.0]]]).reshape(
