@@ -112,6 +112,21 @@ def _bench(args: argparse.Namespace) -> None:
     print(json.dumps(figures, indent=2) if args.json else format_table(figures))
 
 
+def _doctor_options(parser: Arguments) -> None:
+    parser.add_argument(
+        "--sessions", type=Path, default=DEFAULT_SESSIONS, metavar="DIR", help="where logs go"
+    )
+    parser.add_argument("--port", type=_port, default=8080, help="port the page will be served on")
+    parser.add_argument("--no-browser", action="store_true", help="start no browser to look at it")
+    parser.add_argument("--json", action="store_true", help="print JSON instead of lines")
+
+
+def _doctor(args: argparse.Namespace) -> int:
+    from app.doctor.command import doctor
+
+    return doctor(args.sessions, args.port, browser=not args.no_browser, as_json=args.json)
+
+
 def _figures_options(parser: Arguments) -> None:
     parser.add_argument("which", choices=("paper",), help="the paper's conceptual figures")
     parser.add_argument("--out", type=Path, default=Path("figures"), metavar="DIR")
@@ -154,6 +169,7 @@ def _simulate(args: argparse.Namespace) -> int:
 COMMANDS: dict[str, Command] = {
     "run": Command("serve the live page (the default)", _run_options, _run),
     "sessions": Command("list recorded trials and their outcomes", _sessions_options, _sessions),
+    "doctor": Command("look for what would spoil a session here", _doctor_options, _doctor),
     "bench": Command("measure this machine", _bench_options, _bench),
     "figures": Command("draw the method from the running code", _figures_options, _figures),
     "simulate": Command("run studies with simulated users", _simulate_options, _simulate),

@@ -1,13 +1,14 @@
 """What the server is told at start, validated once; every number with its unit."""
 
 import argparse
-import os
+import functools
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
 from app.errors import AppError
+from app.web.capacity import find_capacity
 
 LOOPBACK_HOSTS = ("127.0.0.1", "::1", "localhost")
 LIVE_TIMEOUT_S = 300.0
@@ -89,10 +90,10 @@ class ServerConfig:
                 "--behind-tls-proxy https://your.public.name"
             )
 
-    @property
+    @functools.cached_property
     def max_workers(self) -> int:
-        """Most workers at once; 3 a core where nothing else is said (measured: 4–6 on two)."""
-        return self.capacity or 3 * (os.cpu_count() or 1)
+        """Most workers at once; where nothing else is said, see `capacity.find_capacity`."""
+        return self.capacity or find_capacity().sessions
 
     @property
     def behind_tls_proxy(self) -> bool:

@@ -1,0 +1,1 @@
+"""`hindsight doctor`: what on this machine would spoil a session, and what to do about it."""
