@@ -1,21 +1,19 @@
 # pyright: reportMissingImports=false
 """Differential inverse kinematics: a twist of the hand to joint velocities within all limits.
 
-Pink builds the quadratic program and daqp solves it. When the arm overreaches, damped least squares
-with clipping leaves the commanded line by 215 mm and a plain program by 55 to 217 mm; with the
-weights of `ik_terms.TwistTask` it is 2 mm.
+Pinocchio gives the arm's Jacobian, `ik_kernels` states the quadratic program, daqp solves it. When
+the arm overreaches, damped least squares with clipping leaves the commanded line by 215 mm and a
+plain program by 55 to 217 mm; with the program's weights it is 2 mm. Pink, which assembles such
+programs from general parts, takes longer for that than a tick's physics; it is the reference in the
+tests, which hold both solutions equal to 1e-6 rad/s.
 """
 
 from functools import lru_cache
 from typing import Literal
 
+import daqp
 import numpy as np
 import pinocchio as pin
-import qpsolvers
-from pink import Configuration, build_ik
-from pink.exceptions import PinkError
-from pink.limits import VelocityLimit
-from pink.tasks import DampingTask, PostureTask
 
 from app.core.types import Array, Pose
 from app.robot.arm import (
@@ -28,19 +26,17 @@ from app.robot.arm import (
     MAX_VELOCITY,
     N_JOINTS,
 )
-from app.robot.ik_terms import MotionLimit, TwistTask
+from app.robot.ik_kernels import bound, objective, settle
 from app.robot.scene import Scene
 
-REGULARISATION = 1e-3
-"""Weight of damping and posture against the twist. With the weighted twist 1e-3 tracks as well as
-1e-5, and the arm no longer swirls about its free axis at the end of its reach."""
-POSTURE_GAIN = 0.1
-"""Share of the way to the start posture taken per tick along the free axis; 1 would jerk."""
-
 MIN_DT, MAX_DT = 1e-4, 0.1  # [s]: a shorter or longer tick is a mistake
-MAX_TWIST = 10.0  # [m/s, rad/s] of any component; what is asked beyond it only costs precision
 
 SolveStatus = Literal["solved", "braking"]
+
+_LIMITS = np.stack([JOINT_LOW, JOINT_HIGH, MAX_VELOCITY, MAX_ACCELERATION])
+_WORLD_AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+_NO_ROWS = np.empty((0, N_JOINTS))  # all constraints are bounds of single joints
+_INEQUALITIES = np.zeros(N_JOINTS, dtype=np.intc)
 
 
 @lru_cache(maxsize=1)
@@ -68,13 +64,10 @@ class Kinematics:
         self._frame = self._model.getFrameId(HAND_SITE)
         self._data = self._model.createData()
         start = np.clip(scene.start_joint_positions, JOINT_LOW, JOINT_HIGH)
-        self._configuration = Configuration(self._model, self._data, start, copy_data=False)
-        self._twist = TwistTask(HAND_SITE)
-        posture = PostureTask(cost=REGULARISATION, gain=POSTURE_GAIN)
-        posture.set_target(start)
-        self._tasks = (self._twist, posture, DampingTask(cost=REGULARISATION))
-        self._motion = MotionLimit(JOINT_LOW, JOINT_HIGH, MAX_VELOCITY, MAX_ACCELERATION)
-        self._limits = (VelocityLimit(self._model, MAX_VELOCITY), self._motion)
+        self._start = start
+        self._middle, self._lower, self._upper = np.empty((3, N_JOINTS))
+        self._rows = np.empty((6, N_JOINTS))
+        self._hessian, self._gradient = np.empty((N_JOINTS, N_JOINTS)), np.empty(N_JOINTS)
 
     def hand_pose(self, joint_positions: Array) -> Pose:
         """T_world_ee at joint positions q [rad], shape (7,)."""
@@ -84,19 +77,16 @@ class Kinematics:
     def jacobian(self, joint_positions: Array) -> Array:
         """∂[v; ω]/∂q̇ of the hand in the world frame, shape (6, 7)."""
         return pin.computeFrameJacobian(
-            self._model,
-            self._data,
-            joint_positions,
-            self._frame,
-            pin.ReferenceFrame.LOCAL_WORLD_ALIGNED,
+            self._model, self._data, joint_positions, self._frame, _WORLD_AXES
         )
 
     def solve(self, q: Array, qd_previous: Array, twist: Array, dt: float) -> Array:
         """Joint velocities that move the hand by a twist, as well as the limits allow.
 
-        min |J q̇ − twist|² + small posture and damping, subject to velocity, acceleration and
-        position limits, the latter with room to brake. Never raises: where no solution is found,
-        or an input is not finite, `status` is "braking" and the result slows the arm down.
+        `ik_kernels` says what is minimised within which bounds of velocity, acceleration and
+        position. Never raises: where no solution is found, or an input is not finite or of another
+        shape, `status` is "braking" and the result slows the arm down. Equal inputs give equal
+        results, whatever was solved before.
 
         Args:
             q: Joint positions to solve at [rad] (the servo's reference), shape (7,).
@@ -107,43 +97,36 @@ class Kinematics:
         Returns:
             q̇ [rad/s], shape (7,).
         """
-        previous = _finite(qd_previous)
-        previous = np.clip(previous, -MAX_VELOCITY, MAX_VELOCITY)
-        if not (np.isfinite(q).all() and np.isfinite(twist).all() and MIN_DT <= dt <= MAX_DT):
-            return self._brake(previous, dt)
-        twist = twist * min(1.0, MAX_TWIST / max(float(np.abs(twist).max()), MAX_TWIST))
+        shapes = q.shape == qd_previous.shape == (N_JOINTS,) and twist.shape == (6,)
+        if not (shapes and MIN_DT <= dt <= MAX_DT):
+            return self._brake(qd_previous, dt)
+        middle, lower, upper = self._middle, self._lower, self._upper
+        if not bound(q, qd_previous, dt, _LIMITS, middle, lower, upper):
+            return self._brake(qd_previous, dt)
         # Half a tick ahead, the Jacobian is that of the middle of the step: the hand leaves the
         # commanded line by O(dt³) rather than O(dt²) per tick.
-        position = np.clip(q, JOINT_LOW, JOINT_HIGH)
-        self._motion.set_state(position, previous)
-        middle = np.clip(position + 0.5 * dt * previous, JOINT_LOW, JOINT_HIGH)
-        try:
-            self._configuration.update(middle)
-            self._twist.set_displacement(twist * dt)
-            problem = build_ik(self._configuration, self._tasks, dt, limits=self._limits)
-            solution = qpsolvers.solve_problem(problem, solver="daqp")
-        except (PinkError, qpsolvers.QPError, ValueError, ArithmeticError):
-            return self._brake(previous, dt)
-        if not solution.found or solution.x is None or not np.isfinite(solution.x).all():
-            return self._brake(previous, dt)
+        jacobian = self.jacobian(middle)
+        hessian, gradient = self._hessian, self._gradient
+        if not objective(jacobian, middle, self._start, twist, dt, self._rows, hessian, gradient):
+            return self._brake(qd_previous, dt)
+        velocity, _, flag, _ = daqp.solve(hessian, gradient, _NO_ROWS, upper, lower, _INEQUALITIES)
+        # daqp keeps the bounds to 1e-6 rad/s; here they are exact.
+        if flag <= 0 or not settle(velocity, lower, upper):
+            return self._brake(qd_previous, dt)
         self.status = "solved"
-        # daqp keeps the limits to 1e-6 rad, which is 1e-4 rad/s; here they are exact.
-        return np.clip(solution.x / dt, *self._motion.bounds(dt))
+        return velocity
 
     def _brake(self, previous: Array, dt: float) -> Array:
         self.status = "braking"
+        if previous.shape != (N_JOINTS,):
+            return np.zeros(N_JOINTS)
+        speed = np.where(np.isfinite(previous), previous, 0.0)
+        speed = np.clip(speed, -MAX_VELOCITY, MAX_VELOCITY)
         step = MAX_ACCELERATION * (dt if MIN_DT <= dt <= MAX_DT else 0.01)
-        return np.sign(previous) * np.maximum(np.abs(previous) - step, 0.0)
+        return np.sign(speed) * np.maximum(np.abs(speed) - step, 0.0)
 
 
 def to_pose(placement: pin.SE3) -> Pose:
     """Pinocchio's placement as a Pose (its quaternions are x y z w)."""
     x, y, z, w = pin.Quaternion(placement.rotation).coeffs()
     return Pose(placement.translation.copy(), np.array([w, x, y, z]))
-
-
-def _finite(values: Array) -> Array:
-    array = np.asarray(values, dtype=np.float64)
-    if array.shape != (N_JOINTS,):
-        return np.zeros(N_JOINTS)
-    return np.where(np.isfinite(array), array, 0.0)

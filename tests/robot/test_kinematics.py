@@ -8,9 +8,10 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from app.core.types import Array
-from app.robot import Kinematics, Scene, load_scene
+from app.robot import Kinematics, Scene, kinematics, load_scene
 from app.robot.arm import JOINT_HIGH, JOINT_LOW, MAX_ACCELERATION, MAX_VELOCITY
 from tests.robot.driving import LEVEL
+from tests.robot.pink_reference import PinkKinematics
 
 DT = 0.01
 
@@ -117,6 +118,55 @@ def test_limits_hold_under_any_pushing(seed: int) -> None:
         assert (np.abs(new - velocity) <= MAX_ACCELERATION * DT + 1e-6).all()
         velocity, q = new, q + DT * new
         assert (q <= JOINT_HIGH + 1e-6).all() and (q >= JOINT_LOW - 1e-6).all()
+
+
+@pytest.mark.parametrize("kind", ["free", "limits", "braking", "rest"])
+def test_pink_finds_the_same_velocities(scene: Scene, kind: str) -> None:
+    """The program is Pink's, stated at less cost: equal to 1e-6 rad/s in whatever posture."""
+    kin, pink = Kinematics(scene), PinkKinematics(scene)
+    rng = np.random.default_rng(3)
+    reach = {"free": 0.3, "limits": 1.0, "braking": 1.0, "rest": 1.0}[kind]
+    for _ in range(250):
+        share = rng.uniform(0.5 - 0.5 * reach, 0.5 + 0.5 * reach, 7)
+        q = JOINT_LOW + share * (JOINT_HIGH - JOINT_LOW)
+        velocity = rng.uniform(-1.0, 1.0, 7) * MAX_VELOCITY * (kind != "rest")
+        if kind == "limits":
+            edge = rng.random(7) < 0.4
+            q = np.where(edge, np.where(share > 0.5, JOINT_HIGH, JOINT_LOW), q)
+        twist = rng.uniform(-1.0, 1.0, 6) * [0.3, 0.3, 0.3, 1.0, 1.0, 1.0]
+        if kind == "braking":
+            twist[:] = 0.0
+        found = kin.solve(q, velocity, twist, DT)
+        assert kin.status == "solved"
+        assert np.abs(found - pink.solve(q, velocity, twist, DT)).max() < 1e-6
+
+
+def test_without_a_compiler_the_velocities_are_the_same(
+    scene: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The kernels run as plain Python where numba does not work."""
+    rng = np.random.default_rng(4)
+    cases = [
+        (rng.uniform(JOINT_LOW, JOINT_HIGH), rng.uniform(-1.0, 1.0, 7), rng.normal(0.0, 0.3, 6))
+        for _ in range(20)
+    ]
+    compiled = [Kinematics(scene).solve(*case, DT) for case in cases]
+    for name in ("bound", "objective", "settle"):
+        kernel = getattr(kinematics, name)
+        monkeypatch.setattr(kinematics, name, getattr(kernel, "py_func", kernel))
+    plain = [Kinematics(scene).solve(*case, DT) for case in cases]
+    assert np.abs(np.array(plain) - np.array(compiled)).max() < 1e-9
+
+
+def test_earlier_solutions_leave_no_trace(scene: Scene) -> None:
+    """Equal inputs give equal bits, so that equal trials are equal."""
+    kin = Kinematics(scene)
+    q, velocity, twist = scene.start_joint_positions, np.zeros(7), np.array([0.3] * 3 + [1.0] * 3)
+    first = kin.solve(q, velocity, twist, DT)
+    kept = first.copy()
+    kin.solve(0.5 * q, np.full(7, 0.5), -twist, DT)
+    assert (first == kept).all()
+    assert (kin.solve(q, velocity, twist, DT) == first).all()
 
 
 @settings(max_examples=150, deadline=None)

@@ -1,25 +1,33 @@
 # pyright: reportMissingImports=false
-"""Our two terms of Pink's quadratic program: the commanded twist, and limits on the motion."""
+"""The inverse kinematics as Pink states it: the reference for `app.robot.kinematics`.
+
+The same program from Pink's general parts and two of our own: the commanded twist, and limits on
+the motion.
+"""
 
 import numpy as np
 import pinocchio as pin
-from pink import Configuration
-from pink.limits import Limit
-from pink.tasks import Task
+import qpsolvers
+from pink import Configuration, build_ik
+from pink.limits import Limit, VelocityLimit
+from pink.tasks import DampingTask, PostureTask, Task
 
 from app.core.types import Array
+from app.robot.arm import HAND_SITE, JOINT_HIGH, JOINT_LOW, MAX_ACCELERATION, MAX_VELOCITY
+from app.robot.kinematics import arm_model
+from app.robot.scene import Scene
 
 UNITS = np.array([1.0, 1.0, 1.0, 0.3, 0.3, 0.3])  # [1, 1, 1, m/rad …]
 STRAIGHTNESS = 10.0
+REGULARISATION = 1e-3
+POSTURE_GAIN = 0.1
 
 
 class TwistTask(Task):
     """Make the hand move by a given small displacement: S (J Δq − [v; ω] dt) → 0.
 
-    Axes are those of the world, the point is the hand's: what a twist of the contract means.
     S counts rotation in units of 0.3 m/rad, and what leads off the commanded line STRAIGHTNESS
-    times as much as what is missing along it: at the end of its reach the arm slows down on the
-    line instead of sliding away from it.
+    times as much as what is missing along it.
     """
 
     def __init__(self, frame: str) -> None:
@@ -58,12 +66,7 @@ class TwistTask(Task):
 class MotionLimit(Limit):
     """Joint positions with room to brake, and joint acceleration, as one box that is never empty.
 
-    For the upper side (the lower is its mirror), with d = q_max − q and a the acceleration limit:
-        q̇ ≤ q̇_prev + a dt,   q̇ dt + q̇²/(2a) ≤ d.
-    The second keeps, after this tick, room to stop at a; once it holds, it never asks for more than
-    a, so the two agree. From a state that breaks it (the arm was pushed), the position limit wins.
-    Pink's own AccelerationLimit has no such order and makes the program infeasible there; without
-    any acceleration bound, joints jump by 60–280 rad/s² near a singularity.
+    q̇ ≤ q̇_prev + a dt and q̇ dt + q̇²/(2a) ≤ q_max − q; the lower side is the mirror.
     """
 
     def __init__(self, low: Array, high: Array, velocity: Array, acceleration: Array) -> None:
@@ -100,3 +103,30 @@ class MotionLimit(Limit):
         """G Δq ≤ h of the box."""
         low, high = self.bounds(dt)
         return self._matrix, np.concatenate([high, -low]) * dt
+
+
+class PinkKinematics:
+    """`Kinematics.solve` by Pink, for finite inputs and twists below 10 in every component."""
+
+    def __init__(self, scene: Scene) -> None:
+        model = arm_model()
+        start = scene.start_joint_positions
+        self._configuration = Configuration(model, model.createData(), start)
+        self._twist = TwistTask(HAND_SITE)
+        posture = PostureTask(cost=REGULARISATION, gain=POSTURE_GAIN)
+        posture.set_target(start)
+        self._tasks = (self._twist, posture, DampingTask(cost=REGULARISATION))
+        self._motion = MotionLimit(JOINT_LOW, JOINT_HIGH, MAX_VELOCITY, MAX_ACCELERATION)
+        self._limits = (VelocityLimit(model, MAX_VELOCITY), self._motion)
+
+    def solve(self, q: Array, qd_previous: Array, twist: Array, dt: float) -> Array:
+        """Joint velocities q̇ [rad/s], shape (7,)."""
+        self._motion.set_state(q, qd_previous)
+        middle = np.clip(q + 0.5 * dt * qd_previous, JOINT_LOW, JOINT_HIGH)
+        self._configuration.update(middle)
+        self._twist.set_displacement(twist * dt)
+        problem = build_ik(self._configuration, self._tasks, dt, limits=self._limits)
+        # Pink's unknown is Δq = q̇ dt: the usual tolerance of 1e-6 rad would be 1e-4 rad/s.
+        solution = qpsolvers.solve_problem(problem, solver="daqp", primal_tol=1e-10)
+        assert solution.found and solution.x is not None
+        return solution.x / dt
