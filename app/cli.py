@@ -166,8 +166,84 @@ def _simulate(args: argparse.Namespace) -> int:
     return run(args)
 
 
+def _review_options(parser: Arguments) -> None:
+    parser.add_argument("folder", nargs="?", type=Path, default=DEFAULT_SESSIONS)
+    parser.add_argument("--host", default="127.0.0.1", help="address to listen on")
+    parser.add_argument("--port", type=_port, default=8081, help="port to listen on; 0: any free")
+    parser.add_argument("--open", action="store_true", help="open the page in a browser")
+    parser.add_argument(
+        "--behind-tls-proxy",
+        metavar="ORIGIN",
+        help="public origin of a TLS reverse proxy; needed to serve beyond this machine",
+    )
+    parser.add_argument(
+        "--password-file", type=Path, metavar="FILE", help="ask for the password whose hash it has"
+    )
+    parser.add_argument(
+        "--set-password", type=Path, metavar="FILE", help="write a password file, and end"
+    )
+
+
+def _review(args: argparse.Namespace) -> None:
+    from app.review.command import ask_password, review
+
+    if args.set_password is not None:
+        ask_password(args.set_password)
+        return
+    review(
+        args.folder,
+        host=args.host,
+        port=args.port,
+        public_origin=(args.behind_tls_proxy or "").rstrip("/"),
+        password_file=args.password_file,
+        open_browser=args.open,
+    )
+
+
+def _export_options(parser: Arguments) -> None:
+    parser.add_argument("folder", nargs="?", type=Path, default=DEFAULT_SESSIONS)
+    parser.add_argument("--out", type=Path, default=Path("export"), metavar="DIR")
+    parser.add_argument("--format", choices=("parquet", "csv"), default="parquet")
+    parser.add_argument("--study", metavar="NAME", help="only this study")
+
+
+def _export(args: argparse.Namespace) -> None:
+    from app.recording.export import export_trials
+
+    done = export_trials(args.folder, args.out, args.format, args.study)
+    for problem in done.skipped:
+        print(f"left out: {problem}", file=sys.stderr)
+    print(f"{done.trials} trials in {len(done.files)} files in {args.out}")
+
+
+def _verify_options(parser: Arguments) -> None:
+    parser.add_argument("target", type=Path, metavar="FOLDER|FILE", help="logs to re-simulate")
+
+
+def _verify(args: argparse.Namespace) -> int:
+    from app.review.verify import run
+
+    return run(args.target)
+
+
+def _study_options(parser: Arguments) -> None:
+    from app.study.command import add_options
+
+    add_options(parser)
+
+
+def _study(args: argparse.Namespace) -> int:
+    from app.study.command import run
+
+    return run(args)
+
+
 COMMANDS: dict[str, Command] = {
     "run": Command("serve the live page (the default)", _run_options, _run),
+    "review": Command("see recorded trials again in the browser", _review_options, _review),
+    "export": Command("write trials as tables for other programs", _export_options, _export),
+    "verify": Command("re-simulate logs, bit for bit", _verify_options, _verify),
+    "study": Command("host, check or export a study", _study_options, _study),
     "sessions": Command("list recorded trials and their outcomes", _sessions_options, _sessions),
     "doctor": Command("look for what would spoil a session here", _doctor_options, _doctor),
     "bench": Command("measure this machine", _bench_options, _bench),

@@ -1,6 +1,6 @@
 """Does a log's physics repeat? Re-simulate a trial from its logged controls, bit for bit."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import msgspec
@@ -38,7 +38,7 @@ class Difference:
         return f"step {self.step}: {self.field} differs by up to {gap:.3g}"
 
 
-def resimulate(header: TrialHeader, steps: Sequence[StepRecord]) -> Difference | None:
+def resimulate(header: TrialHeader, steps: Iterable[StepRecord]) -> Difference | None:
     """Step the physics through the logged controls.
 
     Args:

@@ -9,6 +9,7 @@ import threading
 import webbrowser
 
 import uvicorn
+from starlette.applications import Starlette
 
 from app.errors import AppError
 from app.web.config import ServerConfig
@@ -46,7 +47,7 @@ def serve(config: ServerConfig) -> None:
         print(f"Hindsight is at {url}  (Ctrl+C ends it)", flush=True)
         if config.open_browser:
             threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()
-        _serve_until_signal(config, listener)
+        serve_until_signal(HindsightServer(config), listener)
 
 
 def bind(config: ServerConfig) -> socket.socket:
@@ -97,9 +98,16 @@ _DENIALS = _Denials()
 class HindsightServer(uvicorn.Server):
     """A uvicorn that says goodbye to the pages before it closes their sockets."""
 
-    def __init__(self, config: ServerConfig) -> None:
+    def __init__(self, config: ServerConfig, application: Starlette | None = None) -> None:
+        """Prepare to serve.
+
+        Args:
+            config: Validated settings.
+            application: What to serve, with its `SessionRegistry` in `state.registry`; None: the
+                live page.
+        """
         logging.getLogger("uvicorn.error").addFilter(_DENIALS)
-        self.application = create_app(config, WorkerPool(config))
+        self.application = application or create_app(config, WorkerPool(config))
         super().__init__(
             uvicorn.Config(
                 self.application,
@@ -126,11 +134,15 @@ class HindsightServer(uvicorn.Server):
         await super().shutdown(sockets)
 
 
-def _serve_until_signal(config: ServerConfig, listener: socket.socket) -> None:
+def serve_until_signal(server: HindsightServer, listener: socket.socket) -> None:
+    """Serve on a socket until SIGINT or SIGTERM.
+
+    Raises:
+        ServeError: If the server does not start.
+    """
     # uvicorn raises the signals it caught once more after its shutdown: let them be.
     before = {s: signal.signal(s, lambda *_: None) for s in (signal.SIGINT, signal.SIGTERM)}
     try:
-        server = HindsightServer(config)
         server.run(sockets=[listener])
     finally:
         for number, handler in before.items():

@@ -57,7 +57,8 @@ class ViewSockets:
         else:
             session.sockets += 1
             try:
-                await _proxy(socket, session)
+                assert session.worker is not None
+                await proxy_view(socket, session.worker.viewer_port, session.id)
             finally:
                 session.sockets -= 1
 
@@ -73,11 +74,11 @@ async def _worker_ready(session: Session) -> bool:
     return worker.alive and worker.viewer_port > 0
 
 
-async def _proxy(socket: WebSocket, session: Session) -> None:
-    assert session.worker is not None
+async def proxy_view(socket: WebSocket, port: int, session_id: str) -> None:
+    """Carry frames between a browser that may see a view and the viser server on a local port."""
     try:
         upstream = await connect(
-            f"ws://127.0.0.1:{session.worker.viewer_port}",
+            f"ws://127.0.0.1:{port}",
             subprotocols=[Subprotocol(subprotocol())],
             compression=None,
             max_size=None,  # ours, and scenes hold megabytes of meshes
@@ -86,14 +87,14 @@ async def _proxy(socket: WebSocket, session: Session) -> None:
             proxy=None,  # never through the environment's http_proxy
         )
     except (OSError, TimeoutError, WebSocketException) as error:
-        _refused_log.warning(f"session {session.id}: the viewer does not answer: {error}")
+        _refused_log.warning(f"session {session_id}: the viewer does not answer: {error}")
         await deny(socket, 502, "the viewer does not answer")
         return
     code, reason = 1011, "the viewer is gone"
     try:
         await socket.accept(subprotocol=upstream.subprotocol)
         down = asyncio.create_task(_pump_down(upstream, socket))
-        up = asyncio.create_task(_pump_up(socket, upstream, session.id))
+        up = asyncio.create_task(_pump_up(socket, upstream, session_id))
         try:
             done, _ = await asyncio.wait((down, up), return_when=asyncio.FIRST_COMPLETED)
             code, reason = next(iter(done)).result()

@@ -1,0 +1,122 @@
+/** Taking a trial elsewhere: one HTML file, a picture, a film, a link. */
+
+import { byId, h, setText } from "../dom.js";
+import { ask, trialPath } from "./api.js";
+
+const FILM_FPS = 30;
+const FILM_BITS = 6_000_000;
+const FRAME_MS = 1500;
+
+export function createShare(page) {
+  const name = (ending) => {
+    const { meta } = page.trial;
+    return `${meta.participant}-trial-${String(meta.trial).padStart(3, "0")}${ending}`;
+  };
+
+  const save = (blob, filename) => {
+    const link = /** @type {HTMLAnchorElement} */ (h("a", { href: URL.createObjectURL(blob), download: filename }));
+    document.body.append(link);
+    link.click();
+    link.remove();
+    setTimeout(() => URL.revokeObjectURL(link.href), 60_000);
+  };
+
+  const state = h("p", { class: "cap", role: "status" });
+  const tell = (text) => setText(state, text);
+
+  const guarded = (act) => async (event) => {
+    const button = event.currentTarget;
+    button.disabled = true;
+    try {
+      await act();
+    } catch (error) {
+      tell(/** @type {Error} */ (error).message);
+    } finally {
+      button.disabled = false;
+    }
+  };
+
+  const html = async () => {
+    tell("Writing the file …");
+    const response = await ask(`${trialPath(page.trial.meta.id)}/share`, { method: "POST", body: { theme: page.theme }, progress: (share) => tell(`Writing the file … ${Math.round(100 * share)} %`) });
+    save(await response.blob(), name(".html"));
+    tell("Saved. It plays from disk in any browser.");
+  };
+
+  const canvas = () => {
+    const found = page.views.canvas();
+    if (!found) throw new Error("The 3-D view is not there yet.");
+    return found;
+  };
+
+  const picture = async () => {
+    save(await still(canvas(), page), name(`-${page.player.seconds.toFixed(2)}s.png`));
+    tell("Saved the view.");
+  };
+
+  /** Plays the trial from here and records what is seen. */
+  const film = async () => {
+    const type = ["video/webm;codecs=vp9", "video/webm;codecs=vp8", "video/webm"].find((kind) => globalThis.MediaRecorder?.isTypeSupported(kind));
+    if (!type) throw new Error("This browser cannot record WebM.");
+    const recorder = new MediaRecorder(canvas().captureStream(FILM_FPS), { mimeType: type, videoBitsPerSecond: FILM_BITS });
+    const parts = [];
+    recorder.addEventListener("dataavailable", ({ data }) => parts.push(data));
+    const stopped = new Promise((resolve) => recorder.addEventListener("stop", resolve, { once: true }));
+    recorder.start(500);
+    tell("Recording; pause to end.");
+    page.player.play();
+    await new Promise((resolve) => {
+      const over = () => {
+        if (page.player.playing) return;
+        page.player.removeEventListener("played", over);
+        resolve(null);
+      };
+      page.player.addEventListener("played", over);
+    });
+    recorder.stop();
+    await stopped;
+    save(new Blob(parts, { type: "video/webm" }), name(".webm"));
+    tell("Saved the film.");
+  };
+
+  const link = async () => {
+    const wish = new URLSearchParams({ trial: page.trial.meta.id, t: page.player.seconds.toFixed(2) });
+    const url = `${location.origin}/review#${wish}`;
+    field.value = url;
+    field.select();
+    await navigator.clipboard?.writeText(url).then(() => tell("Copied."), () => tell("Copy the link above."));
+  };
+
+  const field = /** @type {HTMLInputElement} */ (h("input", { type: "text", readonly: true, "aria-label": "Link to this moment", dataset: { testid: "share-url" } }));
+  const button = (label, id, act) => h("button", { type: "button", class: "btn line small", dataset: { testid: id }, on: { click: guarded(act) } }, label);
+  byId("share").append(
+    h("h2", {}, "Share"),
+    button("One HTML file of the trial", "share-html", html),
+    button("PNG of the view", "share-png", picture),
+    button("WebM from here on", "share-webm", film),
+    button("Link to this moment", "share-link", link),
+    field,
+    state,
+  );
+  page.pops.add("share-open", "share");
+}
+
+/** What a WebGL canvas shows: its buffer is empty outside a frame, a stream of it is not. */
+async function still(canvas, page) {
+  const video = document.createElement("video");
+  video.muted = true;
+  video.srcObject = canvas.captureStream();
+  const shown = new Promise((resolve, reject) => {
+    video.requestVideoFrameCallback(resolve);
+    setTimeout(() => reject(new Error("The view drew nothing to take a picture of.")), FRAME_MS * 4);
+  });
+  await video.play();
+  page.socket.seek(page.player.step); // a canvas at rest sends no frame
+  await shown;
+  const copy = document.createElement("canvas");
+  copy.width = video.videoWidth;
+  copy.height = video.videoHeight;
+  copy.getContext("2d").drawImage(video, 0, 0);
+  for (const track of /** @type {MediaStream} */ (video.srcObject).getTracks()) track.stop();
+  return new Promise((resolve, reject) => copy.toBlob((blob) => (blob ? resolve(blob) : reject(new Error("The picture could not be encoded."))), "image/png"));
+}
