@@ -84,6 +84,8 @@ def draw_learning(trials: Frame) -> Figure:
         strict=True,
     ):
         _draw_learning(axes, rows, measure, label)
+    handles, labels = figure.axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=6)
     return figure
 
 
@@ -115,7 +117,6 @@ def _draw_learning(axes: Axes, rows: Frame, measure: str, label: str) -> None:
     axes.set_ylim(0.0, 1.1 * float(top) if top > 0 else 1.0)
     axes.set_xlabel("counted trial with the method")
     axes.set_ylabel(f"{label}, mean ± SE")
-    axes.legend(ncols=2, loc="lower left")
 
 
 def draw_link(trials: Frame) -> Figure | None:

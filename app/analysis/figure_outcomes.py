@@ -157,6 +157,17 @@ def _draw_like_against_prefer(
         return
     axes.axhline(0.0, color=LIGHT["edge"], linewidth=1.0)
     axes.axvline(NEUTRAL, color=LIGHT["edge"], linewidth=1.0)
+    reach = max(1.5, float(both["like"].abs().max()) + 0.6)
+    axes.set_ylim(-reach, reach)
+    axes.set_xlim(0.5, 7.5)
+    axes.set_xticks(range(1, 8))
+    axes.set_xlabel(f"prefer: 1 {reference} … 7 {method}")
+    axes.set_ylabel(f"like: {method} − {reference}")
+    if len(styles) > MANY:  # rings would meet: the area of a disc tells how many
+        counts = both.groupby(["prefer", "like"]).size().reset_index(name="n")
+        area = 300.0 * counts["n"] / counts["n"].max()
+        axes.scatter(counts["prefer"], counts["like"], area, color=LIGHT["p1"], alpha=0.8, lw=0)
+        return
     # Points on one coordinate stand around it in rings, as in the paper.
     order = both.groupby(["prefer", "like"]).cumcount().to_numpy()
     size = both.groupby(["prefer", "like"])["like"].transform("size").to_numpy()
@@ -166,7 +177,3 @@ def _draw_like_against_prefer(
     for participant, px, py in zip(both.index, x, y, strict=True):
         colour, marker = styles.get(str(participant), (LIGHT["p1"], "o"))
         axes.plot(px, py, marker, color=colour, ms=6, mec=LIGHT["panel"], mew=0.6)
-    axes.set_xlim(0.5, 7.5)
-    axes.set_xticks(range(1, 8))
-    axes.set_xlabel(f"prefer: 1 {reference} … 7 {method}")
-    axes.set_ylabel(f"like: {method} − {reference}")

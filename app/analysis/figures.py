@@ -68,7 +68,12 @@ def draw_figures(
                 draw_survey(results.survey, people, contrast),
                 "Survey (the paper's figure 7)",
                 "Left, means and standard errors; dotted, the neutral 4. Right, the difference in "
-                "“like” against “prefer”; answers on one coordinate stand around it.",
+                "“like” against “prefer”; "
+                + (
+                    "answers on one coordinate stand around it."
+                    if len(people) <= MANY
+                    else "the area tells how many answered so."
+                ),
             )
         _add_traces(results, add)
         if results.explored:
