@@ -63,7 +63,7 @@ class HandController:
         """Twist and finger command of the next tick."""
         goal = FINGER_OPEN if self.phase == "open" else FINGER_CLOSED
         step = FINGER_SPEED * CONTROL_DT
-        self._finger += float(np.clip(goal - self._finger, -step, step))
+        self._finger += min(max(goal - self._finger, -step), step)
         if self.phase == "open":
             return HandCommand(None, self._finger)
         twist = np.zeros(6)

@@ -1,5 +1,7 @@
 """How a trial ends: a state machine over contacts and object poses, one update per control tick."""
 
+import math
+
 import numpy as np
 
 from app.core.types import Array
@@ -19,7 +21,7 @@ STILL_SPEED = 0.002  # [m/s] of both fingers: they are blocked
 STILL_TIME = 0.25  # [s]
 CLOSE_LIMIT = 3.0  # [s] to get a grip
 CHECK_LIMIT = 3.0  # [s] from the grip to the end of the lift
-TILT = np.cos(np.radians(45.0))
+TILT = math.cos(math.radians(45.0))
 TILT_TIME = 0.2  # [s]
 FALL_DEPTH = 0.03  # [m] below the table's top
 
@@ -63,7 +65,7 @@ class OutcomeMonitor:
         self._grip, self._lost, self._lift = _Timer(), _Timer(), _Timer()
         self._empty, self._still = _Timer(), _Timer()
         self._closing, self._check = _Timer(), _Timer()
-        self._tilt = np.zeros(len(scene.objects))
+        self._tilted_s = [0.0] * len(scene.objects)
 
     @property
     def gripped_name(self) -> str:
@@ -79,13 +81,12 @@ class OutcomeMonitor:
         """
         if self.outcome != "running":
             return self.outcome
-        centres = sim.object_centres()
         if closing:
-            self._watch_grip(sim, centres)
+            self._watch_grip(sim, sim.object_centres())
         else:
             self._release()
         if self.outcome == "running":
-            self._watch_objects(sim, centres)
+            self._watch_objects(sim)
         return self.outcome
 
     def _release(self) -> None:
@@ -126,15 +127,20 @@ class OutcomeMonitor:
         elif self._closing.update(True) >= CLOSE_LIMIT:
             self.outcome = "bad_grip"
 
-    def _watch_objects(self, sim: Simulation, centres: Array) -> None:
-        free = np.ones(len(centres), dtype=bool)
-        if self.gripped is not None:
-            free[self.gripped] = False
-        if bool((free & (centres[:, 2] < -FALL_DEPTH)).any()):
-            self.outcome = "fell_off"
-            return
-        _, x, y = sim.object_poses()[:, 3:6].T
-        upright = 1.0 - 2.0 * (x * x + y * y)  # z component of the object's z axis
-        self._tilt = np.where(free & (upright < TILT), self._tilt + CONTROL_DT, 0.0)
-        if bool((self._tilt >= TILT_TIME - 1e-9).any()):
+    def _watch_objects(self, sim: Simulation) -> None:
+        """Every tick, so in plain numbers: numpy's price is per call."""
+        centres, poses = sim.object_centres().tolist(), sim.object_poses().tolist()
+        longest = 0.0
+        for i, (centre, pose) in enumerate(zip(centres, poses, strict=True)):
+            if i == self.gripped:
+                self._tilted_s[i] = 0.0
+                continue
+            if centre[2] < -FALL_DEPTH:
+                self.outcome = "fell_off"
+                return
+            x, y = pose[4:6]
+            upright = 1.0 - 2.0 * (x * x + y * y)  # z component of the object's z axis
+            self._tilted_s[i] = self._tilted_s[i] + CONTROL_DT if upright < TILT else 0.0
+            longest = max(longest, self._tilted_s[i])
+        if longest >= TILT_TIME - 1e-9:
             self.outcome = "knocked_over"

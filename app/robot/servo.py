@@ -9,6 +9,7 @@ KP = np.array([2000.0, 2000, 2000, 2000, 800, 800, 800])  # [N m/rad], as in arm
 KV = np.array([100.0, 100, 100, 100, 30, 30, 30])  # [N m s/rad]
 DAMPING = np.array([1.0, 1, 1, 1, 0.5, 0.5, 0.5])  # [N m s/rad] of the joints themselves
 LEASH = 0.02  # [rad]
+_LEAD = (KV + DAMPING) / KP  # [s]
 
 
 class Servo:
@@ -43,8 +44,13 @@ class Servo:
         Returns:
             ctrl of the seven joint servos [rad], shape (7,).
         """
-        ahead = np.clip(self.reference - joint_positions, -LEASH, LEASH)
-        reference = np.clip(joint_positions + ahead + dt * joint_velocities, JOINT_LOW, JOINT_HIGH)
-        self.reference = reference
-        self.velocity = np.array(joint_velocities, dtype=np.float64)
-        return reference + (KV + DAMPING) / KP * self.velocity
+        # In place, and without np.clip: this runs in every tick.
+        reference = self.reference - joint_positions
+        np.minimum(reference, LEASH, out=reference)
+        np.maximum(reference, -LEASH, out=reference)
+        reference += joint_positions
+        reference += dt * joint_velocities
+        np.minimum(reference, JOINT_HIGH, out=reference)
+        np.maximum(reference, JOINT_LOW, out=reference)
+        self.reference, self.velocity = reference, joint_velocities.copy()
+        return reference + _LEAD * joint_velocities

@@ -1,6 +1,8 @@
 # pyright: reportAttributeAccessIssue=false
 """The physics of one trial: owns MjModel and MjData, steps them by control ticks."""
 
+from collections.abc import Sequence
+
 import mujoco
 import numpy as np
 
@@ -49,17 +51,21 @@ class Simulation:
         self.data = mujoco.MjData(self.model)
         self.model_hash = model_hash(self.model)
         model = self.model
-        self._joint_q = np.array([model.joint(name).qposadr[0] for name in JOINT_NAMES])
-        self._joint_v = np.array([model.joint(name).dofadr[0] for name in JOINT_NAMES])
-        self._finger_q = np.array([model.joint(name).qposadr[0] for name in FINGER_NAMES])
-        self._finger_v = np.array([model.joint(name).dofadr[0] for name in FINGER_NAMES])
-        first = [model.joint(f"object/{name}").qposadr[0] for name in scene.object_names]
-        self._object_q = np.array(first)[:, None] + np.arange(7)
-        self._bodies = np.array([model.body(f"object/{name}").id for name in scene.object_names])
+        # Views into MuJoCo's arrays, which stay where they are for the life of MjData.
+        objects = [f"object/{name}" for name in scene.object_names]
+        bodies = [int(model.body(name).id) for name in objects]
+        self._q, self._v = _joint_views(model, self.data, JOINT_NAMES)
+        self._finger_q, self._finger_v = _joint_views(model, self.data, FINGER_NAMES)
+        self._object_q = _joint_views(model, self.data, objects)[0].reshape(-1, 7)
+        self._centres = self.data.xipos[_row_of(bodies)]
         numbers = np.full(model.nbody, -1)
-        numbers[self._bodies] = np.arange(len(self._bodies))
+        numbers[bodies] = np.arange(len(bodies))
         self.geom_object: list[int] = numbers[model.geom_bodyid].tolist()
-        self._site = model.site(HAND_SITE).id
+        site = model.site(HAND_SITE).id
+        self._hand_position, self._hand_matrix = (
+            self.data.site_xpos[site],
+            self.data.site_xmat[site],
+        )
         self._state_size = mujoco.mj_stateSize(model, STATE)
         self.layout: Layout = ()
         if layout is None and seed is not None:
@@ -75,12 +81,12 @@ class Simulation:
         self.layout = self.scene.checked_layout(layout)
         mujoco.mj_resetData(self.model, self.data)
         start = self.scene.start_joint_positions
-        self.data.qpos[self._joint_q] = start
+        self._q[:] = start
         self.data.ctrl[:-1] = start
-        for columns, place in zip(self._object_q, self.layout, strict=True):
+        for pose, place in zip(self._object_q, self.layout, strict=True):
             spot = self.scene.places[place]
             half_yaw = 0.5 * np.radians(spot.yaw_degrees)
-            self.data.qpos[columns] = [
+            pose[:] = [
                 spot.x_m, spot.y_m, 0.0, np.cos(half_yaw), 0.0, 0.0, np.sin(half_yaw)
             ]  # fmt: skip
         mujoco.mj_forward(self.model, self.data)
@@ -92,10 +98,10 @@ class Simulation:
             joint_positions: q [rad], shape (7,).
             finger_travel: Of each finger [m], 0 open.
         """
-        self.data.qpos[self._joint_q] = joint_positions
-        self.data.qpos[self._finger_q] = finger_travel
-        self.data.qvel[self._joint_v] = 0.0
-        self.data.qvel[self._finger_v] = 0.0
+        self._q[:] = joint_positions
+        self._finger_q[:] = finger_travel
+        self._v[:] = 0.0
+        self._finger_v[:] = 0.0
         mujoco.mj_kinematics(self.model, self.data)
 
     def step(self, ctrl: Array) -> None:
@@ -110,10 +116,14 @@ class Simulation:
         if np.shape(ctrl) != (N_CTRL,) or not np.isfinite(ctrl).all():
             raise RobotError(f"ctrl {ctrl!r} is not valid; valid: {N_CTRL} finite numbers")
         self.data.ctrl[:] = ctrl
-        mujoco.mj_step(self.model, self.data, STEPS_PER_TICK)
+        self._advance()
         # mj_step leaves site and body poses one physics step behind qpos; this refreshes them and
         # touches nothing that the next step starts from.
         mujoco.mj_kinematics(self.model, self.data)
+
+    def _advance(self) -> None:
+        """The bare physics of a tick."""
+        mujoco.mj_step(self.model, self.data, STEPS_PER_TICK)
 
     @property
     def time_s(self) -> float:
@@ -123,36 +133,36 @@ class Simulation:
     @property
     def joint_positions(self) -> Array:
         """Arm joints q [rad], shape (7,)."""
-        return self.data.qpos[self._joint_q]
+        return self._q.copy()
 
     @property
     def joint_velocities(self) -> Array:
         """Arm joints q̇ [rad/s], shape (7,)."""
-        return self.data.qvel[self._joint_v]
+        return self._v.copy()
 
     @property
     def finger_positions(self) -> Array:
         """Travel of the left and the right finger [m], 0 open, 0.05 closed, shape (2,)."""
-        return self.data.qpos[self._finger_q]
+        return self._finger_q.copy()
 
     @property
     def finger_velocities(self) -> Array:
         """Speed of the fingers [m/s], closing is positive, shape (2,)."""
-        return self.data.qvel[self._finger_v]
+        return self._finger_v.copy()
 
     def hand_pose(self) -> Pose:
         """Pose of the tool centre `ee` in the world frame."""
         quaternion = np.empty(4)
-        mujoco.mju_mat2Quat(quaternion, self.data.site_xmat[self._site])
-        return Pose(self.data.site_xpos[self._site].copy(), quaternion)
+        mujoco.mju_mat2Quat(quaternion, self._hand_matrix)
+        return Pose(self._hand_position.copy(), quaternion)
 
     def object_poses(self) -> Array:
         """Per object x y z [m] and the quaternion w x y z, world frame, shape (n_objects, 7)."""
-        return self.data.qpos[self._object_q]
+        return self._object_q.copy()
 
     def object_centres(self) -> Array:
         """Centres of mass of the objects in the world frame [m], shape (n_objects, 3)."""
-        return self.data.xipos[self._bodies]
+        return self._centres.copy()
 
     def get_state(self) -> Array:
         """Everything the next step depends on (mjSTATE_INTEGRATION), one float64 vector."""
@@ -174,3 +184,27 @@ class Simulation:
             )
         mujoco.mj_setState(self.model, self.data, vector, STATE)
         mujoco.mj_kinematics(self.model, self.data)
+
+
+def _joint_views(
+    model: mujoco.MjModel, data: mujoco.MjData, names: Sequence[str]
+) -> tuple[Array, Array]:
+    """Views of the positions and the velocities of joints that stand in a row in the model."""
+    joints = _row_of([int(model.joint(name).id) for name in names])
+    ends = joints.stop < model.njnt
+    q_end = model.jnt_qposadr[joints.stop] if ends else model.nq
+    v_end = model.jnt_dofadr[joints.stop] if ends else model.nv
+    first = joints.start
+    return data.qpos[model.jnt_qposadr[first] : q_end], data.qvel[model.jnt_dofadr[first] : v_end]
+
+
+def _row_of(numbers: list[int]) -> slice:
+    """The slice that holds these numbers, in this order.
+
+    Raises:
+        RobotError: If they are not in a row: the model was built in another order.
+    """
+    row = slice(numbers[0], numbers[0] + len(numbers))
+    if numbers != list(range(row.start, row.stop)):
+        raise RobotError(f"{numbers} of the model are not in a row")
+    return row

@@ -143,14 +143,18 @@ class GoalTracker:
 
     def goals(self, object_poses: Array) -> Goals:
         """The targets of objects at these poses, (n_objects, 7)."""
-        if (
-            self._goals is None
-            or self._poses is None
-            or (np.abs(object_poses - self._poses) > self._tolerance).any()
-        ):
+        if self._goals is None or self._poses is None or self._moved(object_poses, self._poses):
             self._poses = object_poses.copy()
             self._goals = goals_in_world(self.targets, object_poses)
         return self._goals
+
+    def _moved(self, poses: Array, before: Array) -> bool:
+        difference = poses - before
+        flat = difference.ravel()
+        # Nearly always all of it together is below the smallest tolerance, which is quickly said.
+        if flat.dot(flat) <= self.MOVED_M**2:
+            return False
+        return bool((np.abs(difference) > self._tolerance).any())
 
     def reset(self) -> None:
         """Forget where the objects were, so that equal trials begin equally."""
