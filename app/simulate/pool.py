@@ -21,6 +21,7 @@ Done = list[tuple[int, list[Row]]]
 CHUNK = 4
 """Trials in one message to a worker: few enough that little is lost with it."""
 _ATTEMPTS = 3
+_START_METHOD = "spawn" if sys.platform == "win32" else "forkserver"
 
 
 def available_cores() -> int:
@@ -49,8 +50,8 @@ def run_trials(study: Study, indices: Sequence[int], workers: int) -> Iterator[D
 
 
 def _run_in_pool(study: Study, todo: deque[tuple[int, ...]], workers: int) -> Iterator[Done]:
-    context = multiprocessing.get_context("forkserver" if sys.platform != "win32" else "spawn")
-    if sys.platform != "win32":
+    context = multiprocessing.get_context(_START_METHOD)
+    if _START_METHOD == "forkserver":
         context.set_forkserver_preload(["app.simulate.preload"])
     failures = 0
     while todo:
@@ -59,7 +60,7 @@ def _run_in_pool(study: Study, todo: deque[tuple[int, ...]], workers: int) -> It
         try:
             while todo or running:
                 while todo and len(running) < 2 * workers:
-                    running[pool.submit(_run_chunk, todo[0])] = todo[0]
+                    running[pool.submit(_work, todo[0])] = todo[0]
                     todo.popleft()
                 for future in wait(running, return_when=FIRST_COMPLETED).done:
                     done = future.result()
@@ -102,3 +103,6 @@ def _exit_with(sentinel: int) -> None:
 def _run_chunk(indices: tuple[int, ...]) -> Done:
     assert _runner is not None
     return [(index, _runner.run(index)) for index in indices]
+
+
+_work = _run_chunk

@@ -13,7 +13,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from app.core import Goals, Pose, UserInput
+from app.core import Goals, Pose, UserInput, compute_input
 from app.core.rotations import rotation_between
 from app.core.types import Array
 from app.simulate.models.parameters import COMMON, Parameter
@@ -23,7 +23,7 @@ DECISION_TICKS = 4
 DECISION_S = 0.04
 _VELOCITY_LOOKS = 3  # decisions over which motion is seen
 _METRES_PER_RADIAN = 0.1  # an angle of 0.1 rad is as far off as 10 mm
-_LOYALTY_M = 0.01  # another grasp must be nearer by this to be preferred
+_LOYALTY_M = 0.003  # another grasp must be nearer by this to be preferred
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,22 +62,26 @@ class Percept:
         time_s: Now, since the start signal [s].
         pose: The hand's pose then.
         velocity: The hand's velocity then [m/s], shape (3,).
+        pushed: The input given while it moved so, per world axis, full stick = 1, shape (3,).
         target: Row of the grasp pursued, among those of the user's object.
         position: Of that grasp [m], shape (3,).
         quaternion: Of that grasp, w x y z, shape (4,).
         distance: To it [m].
         angle: To it [rad].
+        grips: Whether the hand, as seen, is at any grasp of the object.
         sight: What there is to see now.
     """
 
     time_s: float
     pose: Pose
     velocity: Array
+    pushed: Array
     target: int
     position: Array
     quaternion: Array
     distance: float
     angle: float
+    grips: bool
     sight: Sight
 
 
@@ -112,6 +116,7 @@ class User(ABC):
         self._rng = rng
         self._late = round(parameters["delay_s"] / DECISION_S)
         self._seen: deque[Pose] = deque(maxlen=self._late + _VELOCITY_LOOKS + 1)
+        self._given: deque[Array] = deque(maxlen=self._late + _VELOCITY_LOOKS + 1)
         self._looks = 0
         self._kept = float(np.exp(-DECISION_S / parameters["noise_time_s"]))
         self._fresh = float(np.sqrt(1.0 - self._kept**2))
@@ -130,16 +135,18 @@ class User(ABC):
         self._seen.append(sight.pose)
         self._looks += 1
         self._noise = self._kept * self._noise + self._fresh * self._rng.standard_normal(3)
-        return self._decide(sight) if self._looks > self._late else Action(REST)
+        action = self._decide(sight) if self._looks > self._late else Action(REST)
+        self._given.append(compute_input(action.input)[:3])
+        return action
 
     def _decide(self, sight: Sight) -> Action:
         percept = self._perceive(sight)
-        inside = percept.distance <= self.p["tolerance_m"]
-        if inside and percept.angle <= self.p["tolerance_rad"]:
+        if percept.grips:
             return Action(REST, close=True)
         self._at_grasp = self._at_grasp + 1 if percept.distance <= 0.03 else 0
         meant = self.intend(percept)
-        if self._at_grasp > self._patience and inside and meant.any():
+        there = percept.distance <= self.p["tolerance_m"]
+        if self._at_grasp > self._patience and there and meant.any():
             return Action(self._turn(percept))
         return Action(self._push(meant))
 
@@ -149,6 +156,7 @@ class User(ABC):
         before = max(0, now - _VELOCITY_LOOKS)
         pose = seen[now]
         velocity = (pose.position - seen[before].position) / (_VELOCITY_LOOKS * DECISION_S)
+        given = list(self._given)[before:now]
         row = sight.goals.names.index(self.goal)
         start, stop = sight.goals.offsets[row], sight.goals.offsets[row + 1]
         positions = sight.goals.positions[start:stop]
@@ -156,6 +164,7 @@ class User(ABC):
         offsets = positions - pose.position
         distances = np.sqrt(np.einsum("ij,ij->i", offsets, offsets))
         angles = 2.0 * np.arccos(np.minimum(np.abs(quaternions @ pose.quaternion), 1.0))
+        near = (distances <= self.p["tolerance_m"]) & (angles <= self.p["tolerance_rad"])
         far = distances + _METRES_PER_RADIAN * angles
         if self._grasp >= 0:
             far[self._grasp] -= _LOYALTY_M
@@ -164,11 +173,13 @@ class User(ABC):
             time_s=sight.time_s,
             pose=pose,
             velocity=velocity,
+            pushed=np.sum(given, axis=0) / _VELOCITY_LOOKS if given else np.zeros(3),
             target=best,
             position=positions[best],
             quaternion=quaternions[best],
             distance=float(distances[best]),
             angle=float(angles[best]),
+            grips=bool(near.any()),
             sight=sight,
         )
 

@@ -7,6 +7,7 @@ from app.simulate.models.base import Percept, User
 from app.simulate.models.parameters import COMMON, Parameter
 
 STILL = np.zeros(3)
+EXPECTED_SPEED = Parameter(0.2, 0.01, 2.0, "speed the user expects of a full stick [m/s]")
 
 
 class Continue(User):
@@ -18,20 +19,24 @@ class Continue(User):
 
 
 class Lazy(User):
-    """Lets go while the robot is seen moving the right way (paper, Fig. 8)."""
+    """Lets go while the robot is seen moving the right way by itself (paper, Fig. 8)."""
 
     PARAMETERS = COMMON | {
         "content_cosine": Parameter(
-            0.6, -1.0, 1.0, "cosine of seen motion and wish from which the robot may go on"
+            0.6, -1.0, 1.0, "cosine of the robot's motion and the wish from which it may go on"
         ),
-        "content_m_s": Parameter(0.02, 0.0, 0.5, "speed from which the robot seems to move [m/s]"),
+        "content_m_s": Parameter(
+            0.02, 0.0, 0.5, "speed from which the robot is seen to move by itself [m/s]"
+        ),
+        "full_stick_m_s": EXPECTED_SPEED,
     }
 
     def intend(self, percept: Percept) -> Array:
-        """Pursue, unless the hand is on its way without that."""
+        """Pursue, unless the robot is on the way without that."""
         wish = self.pursue(percept)
-        along = float(wish @ percept.velocity)
-        speed = float(np.sqrt(percept.velocity @ percept.velocity))
+        robot = _by_itself(self, percept)
+        along = float(wish @ robot)
+        speed = float(np.sqrt(robot @ robot))
         size = float(np.sqrt(wish @ wish))
         # Near the grasp the robot slows down, too; what counts as moving shrinks with the wish.
         moving = speed > self.p["content_m_s"] * min(1.0, size / self.p["vigour"])
@@ -45,18 +50,23 @@ class Fight(User):
         "resistance": Parameter(
             1.0, 0.0, 5.0, "how much of unwanted motion is pushed back, 1: as fast as it is"
         ),
-        "full_stick_m_s": Parameter(0.2, 0.01, 2.0, "speed the user expects of a full stick [m/s]"),
+        "full_stick_m_s": EXPECTED_SPEED,
     }
 
     def intend(self, percept: Percept) -> Array:
-        """Pursue, minus what the hand was seen to do beside or against the wish."""
+        """Pursue, minus what the robot was seen to do by itself beside or against the wish."""
         wish = self.pursue(percept)
         size = float(np.sqrt(wish @ wish))
         if size == 0.0:
             return wish
         direction = wish / size
-        along = float(percept.velocity @ direction)
-        unwanted = percept.velocity - max(0.0, along) * direction
+        robot = _by_itself(self, percept)
+        unwanted = robot - max(0.0, float(robot @ direction)) * direction
         pushed = wish - self.p["resistance"] * unwanted / self.p["full_stick_m_s"]
         # No one presses harder against the robot than twice the usual.
         return pushed * min(1.0, 2.0 * self.p["vigour"] / float(np.sqrt(pushed @ pushed) + 1e-12))
+
+
+def _by_itself(user: User, percept: Percept) -> Array:
+    """The part of the seen velocity that the user's own pushing does not explain [m/s], (3,)."""
+    return percept.velocity - user.p["full_stick_m_s"] * percept.pushed
