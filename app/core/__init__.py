@@ -14,6 +14,7 @@ from app.core.pipeline import (
     counterfactuals,
     initial_state,
     known_goal_twist,
+    known_goal_twist_of_step,
 )
 from app.core.presets import PRESETS, preset
 from app.core.settings import AssistanceSettings, settings_from_dict, settings_to_dict
@@ -39,6 +40,7 @@ __all__ = [
     "counterfactuals",
     "initial_state",
     "known_goal_twist",
+    "known_goal_twist_of_step",
     "make_goals",
     "preset",
     "settings_from_dict",

@@ -1,7 +1,7 @@
 """One tick of the assistance: belief, V, Q, method, limits. Pure: state in, state out."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -51,6 +51,7 @@ class AssistanceStep:
         values: V_g(x) [nat], shape (n_goals,).
         q_values: Q_g(x, u) [nat], shape (n_goals,).
         best_targets: Per goal the row of the target that is best after the action, int64.
+        situation: What the method was given; not to be changed.
     """
 
     direct: Array
@@ -60,6 +61,7 @@ class AssistanceStep:
     values: Array
     q_values: Array
     best_targets: npt.NDArray[np.int64]
+    situation: Situation = field(repr=False, compare=False)
 
 
 def initial_state(
@@ -127,8 +129,9 @@ def assist(
     twist = limited(asked, state.twist, settings, dt)
     belief, user = rows[BELIEF], x[7:]
     following = AssistanceState(belief, rows[LOG_BELIEF], state.log_prior, twist, elapsed)
+    values, q_values, best = rows[VALUE], rows[Q_VALUE], situation.best_targets
     return following, AssistanceStep(
-        user, asked - user, twist, belief, rows[VALUE], rows[Q_VALUE], situation.best_targets
+        user, asked - user, twist, belief, values, q_values, best, situation
     )
 
 
@@ -173,11 +176,33 @@ def known_goal_twist(
         CoreError: If an argument is not valid; the message names it.
     """
     situation = _situation(settings, goals, state, _packed(pose, direct), _NO_EVIDENCE)
+    return _asked_if_known(settings, situation, goal)
+
+
+def known_goal_twist_of_step(
+    settings: AssistanceSettings, step: AssistanceStep, goal: str | int
+) -> Array:
+    """Return `known_goal_twist` for the input of a step, without evaluating the goals anew.
+
+    Args:
+        settings: Those of the step, but for `method` and `enabled`.
+        step: As `assist` returned it.
+        goal: The true goal, by name or row.
+
+    Raises:
+        CoreError: If there is no such goal.
+    """
+    return _asked_if_known(settings, step.situation, goal)
+
+
+def _asked_if_known(settings: AssistanceSettings, situation: Situation, goal: str | int) -> Array:
+    goals, rows = situation.goals, situation.rows
     row = goal_index(goals, goal)
-    situation.belief = np.zeros(goals.n_goals)
-    situation.belief[row] = 1.0
-    situation.expected_gradient = situation.rows[GRADIENT : GRADIENT + 6, row].copy()
-    return _asked(settings, settings.method, situation)
+    certain = np.zeros(len(goals.names))
+    certain[row] = 1.0
+    gradient = rows[GRADIENT : GRADIENT + 6, row].copy()
+    known = Situation(settings, goals, situation.x, certain, rows, situation.best_targets, gradient)
+    return _asked(settings, settings.method, known)
 
 
 _NO_EVIDENCE = Evidence(0.0, 0.0, 1.0)

@@ -14,7 +14,7 @@ from app.core import (
     assist,
     counterfactuals,
     initial_state,
-    known_goal_twist,
+    known_goal_twist_of_step,
     settings_from_dict,
 )
 from app.core.presets import METHOD_DEFAULTS
@@ -80,10 +80,7 @@ class Assistant:
         """What the last update would have added had the goal been known, (6,)."""
         if not self.settings.enabled:
             return STILL
-        known = known_goal_twist(
-            self.settings, self._goals, self._state, self._pose, self._direct, goal
-        )
-        return known - self._direct
+        return known_goal_twist_of_step(self.settings, self.step, goal) - self._direct
 
     def counterfactuals(self) -> dict[str, Array]:
         """What each method would have asked for in the last update: method → twist (6,)."""
