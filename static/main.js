@@ -90,16 +90,26 @@ function welcome(hello) {
   asked = null;
 }
 
+const SLOW_FRAME_MS = 60;
 let stale = true;
-store.addEventListener("change", () => (stale = true));
+let renderedAt = 0;
+store.addEventListener("change", () => {
+  stale = true;
+  // Where the picture takes the frames' time, the figures follow the messages instead.
+  if (performance.now() - renderedAt > SLOW_FRAME_MS) render();
+});
 
 function frame() {
   requestAnimationFrame(frame);
   look();
   tags.place();
   // The countdown and the wishes' end come with time, not with a change.
-  if (!stale && store.state.connection.state === "connected" && !store.wishes.size) return;
+  if (stale || store.state.connection.state !== "connected" || store.wishes.size) render();
+}
+
+function render() {
   stale = false;
+  renderedAt = performance.now();
   for (const part of parts) part.render();
 }
 

@@ -5,7 +5,7 @@ window.driver = (() => {
   const $ = (id) => document.querySelector(`[data-testid="${id}"]`);
   const look = (id) => ['x', 'y', 'z'].map((k) => Number($(id).dataset[k]));
   const clip = (v, limit = 1) => Math.max(-limit, Math.min(limit, v));
-  const frame = () => new Promise(requestAnimationFrame);
+  const frame = () => new Promise((done) => setTimeout(done, 25));
   const held = {};
 
   function pointer(id, kind, x, y) {
@@ -75,8 +75,17 @@ window.driver = (() => {
     const ends = performance.now() + 1000 * seconds;
     let settled = 0;
     let aligned = false;
+    let seen = '';  // the last figures of the hand, and when they changed
+    let seenAt = performance.now();
+    let pace = 0.05;  // [s] between two looks, on average
     while ($('trial').dataset.outcome === 'running' && performance.now() < ends) {
       const hand = look('hand');
+      if (hand.join() !== seen) {
+        pace += 0.3 * ((performance.now() - seenAt) / 1000 - pace);
+        [seen, seenAt] = [hand.join(), performance.now()];
+      }
+      // Whoever sees the hand jump pushes less: no more than 2 cm between two looks.
+      const reach = clip(0.02 / (0.2 * pace), 1);
       const object = look(`object-${name}`);
       const [dx, dy, dz] = object.map((value, i) => value - hand[i]);
       // First beside and behind the object, then straight in.
@@ -94,7 +103,7 @@ window.driver = (() => {
         if (settled > 6) { await close(); break; }
       } else {
         settled = 0;
-        steer(clip(right), clip(away), clip(ez));
+        steer(clip(right, reach), clip(away, reach), clip(ez, reach));
       }
       await frame();
     }
