@@ -15,22 +15,22 @@ from app.errors import AppError
 from app.recording.cache import load_cache
 from app.recording.errors import RecordingError
 from app.recording.numbering import FINISHED
-from app.recording.store import entry_of
 from app.review.errors import ConflictError, MissingError, OutsideError, ReviewError
-from app.review.folder import Listed, ReviewFolder
+from app.review.folder import Listed, ReviewFolder, look_up
 from app.review.gate import Gate
 from app.review.glance import Glances
 from app.review.jobs import Job, Jobs
-from app.review.meta import about
 from app.review.notes import read_notes, save_notes
+from app.review.opening import present
 from app.review.packing import MEDIA_TYPE
-from app.review.replay import Replay
-from app.review.signals import Signals, make_signals
+from app.review.signals import Signals
 from app.review.wishes import ShareWish, WhatIfWish
 
 MAX_BODY_BYTES = 64 * 1024
 MAX_OPEN = 2
 """Trials whose curves are kept in memory; two, so that memory stays flat whatever is opened."""
+
+_ALL_METHODS = ("GET", "POST", "PUT", "DELETE")
 
 Endpoint = Callable[[Request], Awaitable[Response]]
 Opened = tuple[dict[str, Any], Signals]
@@ -57,7 +57,7 @@ class Api:
             Route(trial + "/share", act(self._share), methods=["POST"]),
             Route("/api/review/jobs/{job}", get(self._job)),
             Route("/api/review/jobs/{job}", act(self._cancel), methods=["DELETE"]),
-            Route("/api/review/{rest:path}", get(self._unknown)),
+            Route("/api/review/{rest:path}", get(self._unknown), methods=list(_ALL_METHODS)),
         ]
 
     # who may, and how refusals are said
@@ -133,18 +133,17 @@ class Api:
         Raises:
             RecordingError: If the log cannot be used at all.
         """
-        entry = entry_of(path)
-        if entry.problem:
-            raise RecordingError(entry.problem)
         stat = path.stat()
         key = (trial_id, (stat.st_size, stat.st_mtime_ns))
         known = self._open.get(key)
         if known is None:
+            entry = look_up(path)
+            if entry.problem:
+                raise RecordingError(entry.problem)
             log = load_cache(path)
             if log is None:
                 return None
-            replay = Replay(log)
-            known = about(replay, trial_id), make_signals(replay)
+            known = present(log, trial_id)
         self._open[key] = known
         self._open.move_to_end(key)
         while len(self._open) > MAX_OPEN:

@@ -26,7 +26,7 @@ export function distanceTable(trial) {
 
 /**
  * What the plots show of several trials.
- * @returns {{x: Float64Array, panels: any[], arrays: Record<string, Float64Array>, unit: string}}
+ * @returns {{x: Float64Array, panels: any[], arrays: Record<string, (number|null)[]>, unit: string}}
  */
 export function comparisonOf(trials, tables, by) {
   const distance = by === "distance";
@@ -45,7 +45,7 @@ export function comparisonOf(trials, tables, by) {
     unit,
     curves: trials.map((trial, k) => {
       const array = `${key}:${k}`;
-      arrays[array] = Float64Array.from(rowsOf.rows[k], (row) => (row < 0 ? NaN : read(trial, row)));
+      arrays[array] = Array.from(rowsOf.rows[k], (row) => (row < 0 ? null : read(trial, row)));
       return { array, name: `${k + 1}. ${trial.meta.participant} ${trial.meta.trial}, ${trial.meta.method}`, role: `trial:${k}` };
     }),
   }));

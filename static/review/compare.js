@@ -38,6 +38,7 @@ export function createCompare(page) {
       tables = trials.map(distanceTable);
       page.trial = trials[0];
       page.show(trials[0]);
+      page.whatIf.close();
       on = true;
       bar.hidden = false;
       document.body.dataset.comparing = String(trials.length);

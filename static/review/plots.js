@@ -31,7 +31,7 @@ class Panel {
     const own = this.about.curves.map((curve) => ({ ...curve, values: (comparison ?? trial).arrays[curve.array] }));
     if (!alternative) return own;
     const recomputed = this.about.curves.filter(({ array, role }) => alternative.arrays[array] && role !== "known" && role !== "user");
-    return [...own, ...recomputed.map((curve) => ({ array: curve.array, name: `${curve.name}, ${alternative.name}`, role: curve.role.startsWith("goal:") ? curve.role : "line", dash: DASHES["what-if"], values: this.plots.resample(alternative.arrays[curve.array]) }))];
+    return [...own, ...recomputed.map((curve) => ({ array: curve.array, name: `${curve.name}, ${alternative.name}`, alternative: true, role: curve.role.startsWith("goal:") ? curve.role : "line", dash: DASHES["what-if"], values: this.plots.resample(alternative.arrays[curve.array]) }))];
   }
 
   make(uPlot) {
@@ -40,7 +40,10 @@ class Panel {
     const style = getComputedStyle(document.documentElement);
     const curves = this.curves();
     const colour = (role) => style.getPropertyValue(plots.variable(role)).trim();
-    this.legend.replaceChildren(...curves.filter(({ role }) => curves.length > 1 || role !== "line").map(({ name, role, dash }) => h("span", {}, swatch(colour(role), dash ?? DASHES[role]), name)));
+    const named = curves.filter(({ role, alternative }) => !alternative && (this.about.curves.length > 1 || role !== "line"));
+    const entries = named.map(({ name, role }) => h("span", {}, swatch(colour(role), DASHES[role]), name));
+    if (named.length < curves.length && plots.alternative) entries.push(h("span", {}, swatch(colour("line"), DASHES["what-if"]), plots.alternative.name));
+    this.legend.replaceChildren(...entries);
     const axis = { stroke: style.getPropertyValue("--text-3").trim(), grid: { stroke: style.getPropertyValue("--line").trim(), width: 1 }, ticks: { show: false }, font: "11px system-ui, sans-serif" };
     const x = plots.zoom ?? { min: plots.x[0], max: plots.x.at(-1) };
     this.plot = new uPlot({
@@ -81,7 +84,7 @@ class Panel {
   follow() {
     const { plots } = this;
     const first = (plots.comparison ?? plots.trial)?.arrays[this.about.curves[0].array];
-    if (first) setText(this.value, `${number(first[plots.row])} ${this.about.unit}`.trim());
+    if (first) setText(this.value, `${number(first[plots.row] ?? NaN)} ${this.about.unit}`.trim());
     if (!this.plot) return;
     const at = this.plot.valToPos(plots.position, "x");
     this.head.style.transform = `translateX(${at.toFixed(1)}px)`;

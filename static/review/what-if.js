@@ -41,7 +41,7 @@ export function createWhatIf(page) {
       h("label", { class: "field" }, h("span", { class: "select" }, extra)),
       h("div", { class: "row" },
         h("button", { type: "button", class: "btn primary small", dataset: { testid: "what-if-open" }, on: { click: () => run("open") } }, "On these states"),
-        h("button", { type: "button", class: "btn line small", dataset: { testid: "what-if-closed" }, on: { click: () => run("closed") } }, "From this moment on")),
+        h("button", { type: "button", class: "btn line small", dataset: { testid: "what-if-closed" }, on: { click: () => run("closed") } }, "From here on")),
       h("div", { class: "answer", dataset: { testid: "what-if-result" }, "aria-live": "polite" }),
       h("h3", {}, "Each method, at this moment"),
       h("table", { class: "methods", dataset: { testid: "what-if-moment" } }, h("thead", {}, h("tr", {}, ...["", "asks for", "adds"].map((text) => h("th", { scope: "col" }, text)))), h("tbody")),
@@ -112,7 +112,7 @@ export function createWhatIf(page) {
   /** The alternative in numbers, at the step shown. */
   const follow = (step) => {
     const now = panel.querySelector(".now");
-    if (!result || !now) return;
+    if (!result || !now || page.compare.on) return;
     const steps = result.arrays.step;
     let row = Math.min(steps.length - 1, Math.round((step / Math.max(1, steps.at(-1))) * (steps.length - 1)));
     while (row > 0 && steps[row] > step) row -= 1;
@@ -142,6 +142,11 @@ export function createWhatIf(page) {
       if (!panel.hidden) build();
     },
     follow,
+    /** Out of the way of trials side by side. */
+    close() {
+      clear();
+      if (!panel.hidden) page.pops.toggle("what-if-panel");
+    },
     /** What each method asks for at the step drawn, as the worker reports it. */
     moment(status) {
       const text = JSON.stringify(status.moment);

@@ -79,4 +79,5 @@ def record_trial(
         writer.write_event(event)
     path = writer.close(trial.summary(WALL_S + 60.0))
     assert path is not None, writer.error
+    writer.join()  # its cache is there from now on
     return path
