@@ -19,7 +19,7 @@ LEAST_PROBABILITY = 0.25
 MOST = 2
 FILL_PER_PROBABILITY = 0.6
 EDGE_RAD = 0.6  # edges sharper than this are drawn [rad]
-OPACITY_STEP = 0.02
+OPACITY_STEP = 0.06
 SEGMENTS = 32
 
 

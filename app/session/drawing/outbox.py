@@ -6,11 +6,15 @@ from typing import Any
 import numpy as np
 import viser
 
-POSITION_STEP_M = 2.0**-16
-"""Positions are sent in steps of 15 µm: below a pixel at any distance, above the jitter of a
-position servo at rest, and exact in binary, so that the wire's compression finds the zeros."""
-ROTATION_STEP = 2.0**-16
-"""Quaternions likewise: 3e-5 rad, 0.03 mm at arm's length."""
+POSITION_STEP_M = 2.0**-13
+"""Positions are sent in steps of 0.12 mm: a tenth of a pixel, above the jitter of a position servo
+at rest, and exact in binary, so that the wire's compression finds the zeros."""
+ROTATION_STEP = 2.0**-13
+"""Quaternions likewise: 2.4e-4 rad, 0.2 mm at arm's length."""
+POINT_STEP_M = 2.0**-11
+"""Points of arrows likewise: 0.5 mm."""
+LEAST_MOVE_M = 0.002
+"""An arrow whose tip has moved less than this is left as it is [m]: its length is no gauge."""
 
 
 def rounded(values: Sequence[float] | np.ndarray, step: float) -> tuple[float, ...]:
@@ -51,14 +55,17 @@ class Outbox:
             setattr(handle, name, value)
             self.count += 1
 
-    def points(self, handle: viser.ArrowsHandle, points: np.ndarray) -> None:
-        """Assign an array of points [m], rounded to 1 mm: the length of an arrow is no gauge."""
-        key, value = (handle.name, "points"), np.round(points, 3).astype(np.float32)
+    def points(self, handle: viser.ArrowsHandle, points: np.ndarray) -> bool:
+        """Assign an array of points [m] where one has moved by 2 mm; whether it had."""
+        key = (handle.name, "points")
         before = self._sent.get(key)
-        if before is None or not np.array_equal(before, value):
-            self._sent[key] = value
-            handle.points = value
-            self.count += 1
+        if before is not None and float(np.abs(points - before).max()) < LEAST_MOVE_M:
+            return False
+        value = (np.round(points / POINT_STEP_M) * POINT_STEP_M).astype(np.float32)
+        self._sent[key] = value
+        handle.points = value
+        self.count += 1
+        return True
 
     def forget(self, name: str) -> None:
         """Drop what is known of a node and its children: it is about to be made anew."""

@@ -1,4 +1,9 @@
-"""The value slice in the scene: computed, coloured and sent beside the loop, never in it."""
+"""The value slice in the scene: computed, coloured and sent beside the loop, never in it.
+
+While what it shows keeps changing it is sent as drafts of 2 kB, coarse and without lines; a fine
+one of up to 23 kB follows once the picture holds still, so that a session stays within 30 kB a
+second.
+"""
 
 import logging
 import threading
@@ -13,11 +18,16 @@ from app.core.settings import AssistanceSettings
 from app.core.types import Array, Goals
 from app.session.drawing.layers import BELIEF, SOFT_MIN, SlicePlane
 from app.session.drawing.palette import Theme
-from app.session.drawing.slice_picture import slice_picture
-from app.session.drawing.slice_plane import CELL_M, Bounds, SliceGrid, slice_grid
+from app.session.drawing.slice_picture import DRAFT_SHADES, SHADES, slice_picture
+from app.session.drawing.slice_plane import CELL_M, DRAFT_CELL_M, Bounds, SliceGrid, slice_grid
 
 NODE = "/hindsight/slice"
-PERIOD_S = 0.1  # at most ten pictures a second with iso-lines, twenty without
+PERIOD_S = 0.1
+"""How often a request is looked at [s]."""
+DRAFT_PERIOD_S = 0.5
+"""From one draft to the next [s]."""
+REST_S = 1.0
+"""How long a draft stands before the fine picture takes its place [s]."""
 SAME_POSITION_M, SAME_ROTATION, SAME_BELIEF = 1e-3, 5e-3, 4e-3
 """Changes below these leave the picture as it is: they would move a shade by less than a step."""
 
@@ -59,6 +69,7 @@ class SliceLayer:
         self._server, self._theme, self._compute, self._bounds = server, theme, compute, bounds
         self._image: viser.ImageHandle | None = None
         self._shown: tuple[SliceRequest, Theme] | None = None
+        self._is_draft = False
         self._visible = False
         self._newest: SliceRequest | None = None
         self._lock = threading.Lock()
@@ -102,17 +113,23 @@ class SliceLayer:
         if self._thread is not None:
             self._thread.join(timeout=2.0)
 
-    def draw(self, request: SliceRequest) -> bool:
+    def draw(self, request: SliceRequest, draft: bool = False) -> bool:
         """Draw a slice now, in this thread, if it would look different from the one shown.
+
+        Args:
+            request: What to show.
+            draft: Whether coarse and without lines will do.
 
         Returns:
             Whether a picture was sent.
         """
         with self._lock:
             theme = self._theme
-            if not self._visible or self._same(request, theme):
+            better = self._is_draft and not draft
+            if not self._visible or (self._same(request, theme) and not better):
                 return False
-        grid = slice_grid(request.plane, request.hand_position, self._bounds)
+        cell_m = DRAFT_CELL_M if draft else CELL_M
+        grid = slice_grid(request.plane, request.hand_position, self._bounds, cell_m)
         values = self._compute(
             request.settings,
             request.goals,
@@ -125,19 +142,21 @@ class SliceLayer:
             of="expected" if request.of in (BELIEF, SOFT_MIN) else request.of,
             kind="soft-min" if request.of == SOFT_MIN else "min",
         )
-        picture, span = slice_picture(np.asarray(values), theme, CELL_M)
+        shades = DRAFT_SHADES if draft else SHADES
+        picture, span = slice_picture(np.asarray(values), theme, cell_m, not draft, shades)
         with self._lock:
             if not self._visible:
                 return False
             self._show(grid, picture)
-            self._shown, self.value_range = (request, theme), span
+            self._shown, self._is_draft, self.value_range = (request, theme), draft, span
             self.pictures += 1
         return True
 
     def _run(self) -> None:
-        """Draw the newest request whenever there is one, at most ten times a second."""
+        """Draw the newest request whenever there is one: drafts in a row, then a fine picture."""
+        drawn_s = float("-inf")
         while True:
-            self._wake.wait()
+            self._wake.wait(PERIOD_S if self._is_draft else None)
             if self._end.is_set():
                 return
             self._wake.clear()
@@ -145,11 +164,23 @@ class SliceLayer:
             if request is None or not self._visible:
                 continue
             try:
-                self.draw(request)
+                if self.draw(request, draft=self._follows(request)):
+                    drawn_s = time.monotonic()
+                elif self._is_draft and started - drawn_s > REST_S:
+                    self.draw(request)
             except Exception:  # the view must outlive a slice that cannot be computed
                 log.exception("the value slice could not be drawn")
                 self.value_range = None
-            self._end.wait(max(0.0, PERIOD_S - (time.monotonic() - started)))
+            period = DRAFT_PERIOD_S if drawn_s >= started else PERIOD_S
+            self._end.wait(max(0.0, period - (time.monotonic() - started)))
+
+    def _follows(self, request: SliceRequest) -> bool:
+        """Whether the request shows what is shown already, a moment later: a draft will do."""
+        with self._lock:
+            if self._shown is None or self._shown[1] is not self._theme:
+                return False
+            old = self._shown[0]
+        return (old.of, old.plane, old.settings) == (request.of, request.plane, request.settings)
 
     def _same(self, request: SliceRequest, theme: Theme) -> bool:
         """Whether the picture shown is the one asked for."""
@@ -176,7 +207,8 @@ class SliceLayer:
     def _show(self, grid: SliceGrid, picture: np.ndarray) -> None:
         """Put a picture into the scene, in place where its size is the same."""
         image = self._image
-        if image is None or (image.render_width, image.render_height) != (grid.width, grid.height):
+        size = (grid.width, grid.height)
+        if image is None or not np.allclose((image.render_width, image.render_height), size):
             self._image = self._server.scene.add_image(
                 NODE,
                 picture,

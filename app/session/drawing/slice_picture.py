@@ -20,6 +20,8 @@ RANGE_STEP_NAT = 0.05  # the range is rounded outward to this, so that the legen
 SHADES = 64
 """Steps of the ramp. Fewer distinct pixels make the PNG half as long; a step is below what the eye
 can tell at these opacities."""
+DRAFT_SHADES = 24
+"""The same while the picture keeps changing."""
 
 
 def value_range(values: npt.NDArray[np.float64]) -> tuple[float, float]:
@@ -58,7 +60,11 @@ def edge_fade(shape: tuple[int, int], cell_m: float) -> npt.NDArray[np.float64]:
 
 
 def slice_picture(
-    values: npt.NDArray[np.float64], theme: Theme, cell_m: float, iso_lines: bool = True
+    values: npt.NDArray[np.float64],
+    theme: Theme,
+    cell_m: float,
+    iso_lines: bool = True,
+    shades: int = SHADES,
 ) -> tuple[npt.NDArray[np.uint8], tuple[float, float]]:
     """Colour a grid of cost-to-go.
 
@@ -69,16 +75,17 @@ def slice_picture(
         values: Cost-to-go V [nat], shape (rows, columns).
         theme: Ramp direction and opacities.
         cell_m: Side of a cell [m].
-        iso_lines: Whether lines are drawn; without them the picture is half as long.
+        iso_lines: Whether lines are drawn; without them the PNG is a third as long.
+        shades: Steps of the ramp.
 
     Returns:
         RGBA, shape (rows, columns, 4), and the range (low, high) of the legend [nat].
     """
     low, high = value_range(values)
     near = np.clip((high - values) / (high - low), 0.0, 1.0)
-    shade = np.round(near * (SHADES - 1)).astype(np.intp)
+    shade = np.round(near * (shades - 1)).astype(np.intp)
     cover = _iso_cover(values, iso_step(low, high)) if iso_lines else np.zeros_like(shade)
-    picture = _pixels(theme.name)[shade, cover]
+    picture = _pixels(theme.name, shades)[shade, cover]
     picture[..., 3] = np.round(picture[..., 3] * edge_fade(values.shape, cell_m))
     return picture, (low, high)
 
@@ -98,20 +105,20 @@ def _iso_cover(values: npt.NDArray[np.float64], step: float) -> npt.NDArray[np.i
 
 
 @lru_cache(maxsize=4)
-def _pixels(name: str) -> npt.NDArray[np.uint8]:
-    """Every pixel a slice in a theme can hold, by shade and cover, shape (SHADES, COVERS + 1, 4).
+def _pixels(name: str, shades: int) -> npt.NDArray[np.uint8]:
+    """Every pixel a slice in a theme can hold, by shade and cover, shape (shades, COVERS + 1, 4).
 
     The line is white over the ramp, and both lie over what is behind them.
     """
     look = theme_by_name(name)
-    level = np.linspace(0.0, 1.0, SHADES)[:, None]
+    level = np.linspace(0.0, 1.0, shades)[:, None]
     least, most = look.slice_alpha
     ramp = least + (most - least) * level**ALPHA_POWER
     line = np.linspace(0.0, 1.0, COVERS + 1) * (ISO_ALPHA[0] + ISO_ALPHA[1] * level)
     below = ramp * (1.0 - line)
     total = line + below
-    pixels = np.empty((SHADES, COVERS + 1, 4))
-    colours = ramp_colours(look)[:, None, :]
+    pixels = np.empty((shades, COVERS + 1, 4))
+    colours = ramp_colours(look, shades)[:, None, :]
     pixels[..., :3] = (255.0 * line[..., None] + colours * below[..., None]) / total[..., None]
     pixels[..., 3] = 255.0 * total
     return np.round(pixels).astype(np.uint8)
