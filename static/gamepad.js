@@ -30,7 +30,7 @@ export function watchGamepads(store, input, actions, say) {
     try {
       return [...(navigator.getGamepads?.() ?? [])].filter((pad) => pad?.connected);
     } catch {
-      return []; // a permissions policy may forbid gamepads
+      return []; // a page's permissions may forbid gamepads
     }
   };
 

@@ -15,18 +15,22 @@ class Inbox:
         gate: The newest input and whether it counts.
         round_trip_ms: As last measured by the page.
         ended: Why the session shall end; empty: it goes on.
+        delay_s: How much later than it came input takes effect [s]; for studies of delay.
     """
 
-    def __init__(self, wake: Callable[[], None]) -> None:
+    def __init__(self, wake: Callable[[], None], delay_s: float = 0.0) -> None:
         """Prepare.
 
         Args:
             wake: Called where something has come that the next tick should not wait for.
+            delay_s: How much later than it came input takes effect [s].
         """
         self.gate = InputGate()
         self.round_trip_ms = 0.0
         self.ended = ""
         self._wake = wake
+        self.delay_s = delay_s
+        self._delayed: deque[tuple[float, dict[str, Any]]] = deque()
         self._waiting: deque[dict[str, Any]] = deque()  # append and popleft are atomic
 
     def put(self, message: dict[str, Any]) -> None:
@@ -65,6 +69,8 @@ class Inbox:
 
     def take(self) -> list[dict[str, Any]]:
         """All messages but inputs that have come since the last call, oldest first."""
+        while self._delayed and self._delayed[0][0] <= time.monotonic():
+            self._accept(self._delayed.popleft()[1])
         taken: list[dict[str, Any]] = []
         while True:
             try:
@@ -73,6 +79,12 @@ class Inbox:
                 return taken
 
     def _put_input(self, message: dict[str, Any]) -> None:
+        if self.delay_s > 0.0:
+            self._delayed.append((time.monotonic() + self.delay_s, message))
+        else:
+            self._accept(message)
+
+    def _accept(self, message: dict[str, Any]) -> None:
         try:
             if self.gate.accept(message, time.monotonic()):
                 self._wake()

@@ -83,9 +83,9 @@ class Session:
         self._control: object = None
         self._left = False
         self._done_ticks = 0
-        self._shown_as = ""
+        self._shown_as = options.shown_as
         target = options.target or self._order.next()
-        self.trial = self._begin(settings, target, attempt=1)
+        self.trial = self._begin(settings, target, options.attempt)
 
     @property
     def scene(self) -> Scene:
@@ -271,6 +271,7 @@ class Session:
             trial=self._recorder.next_number(),
             attempt=attempt,
             shown_as=self._shown_as,
+            options=dict(options.factors),
         )
         trial = Trial(
             self._world,

@@ -68,6 +68,11 @@ class SessionOptions:
         commands: Commands the browser may send; None: all. Messages whose client is "server"
             (the web process itself) are always allowed.
         watch: Path of the read-only link, for hello; None: there is none.
+        shown_as: What the first trial's method is called on the page.
+        attempt: Which attempt at its trial of the protocol the first one is.
+        show_objects: Whether the objects and the target's ring are drawn.
+        input_delay_s: How much later than it came the person's input takes effect [s].
+        factors: What else a study varies, kept with every trial's configuration.
     """
 
     record: bool = True
@@ -85,6 +90,11 @@ class SessionOptions:
     hide: tuple[str, ...] = ()
     commands: tuple[str, ...] | None = None
     watch: str | None = None
+    shown_as: str = ""
+    attempt: int = 1
+    show_objects: bool = True
+    input_delay_s: float = 0.0
+    factors: Mapping[str, Any] = field(default_factory=dict)
 
 
 HIDEABLE = ("belief", "assistance", "method", "positions", "settings", "loop", "outcome")
@@ -107,7 +117,8 @@ def parse_options(options: Mapping[str, Any]) -> SessionOptions:
     parsed = SessionOptions(**values)
     _check("start", parsed.start, parsed.start in get_args(StartRule), "auto, input or signal")
     _check("theme", parsed.theme, parsed.theme in ("dark", "light"), "dark or light")
-    for name, low, high in (("viewer_hz", 1, 100), ("status_hz", 1, 60), ("timeout_s", 0, 3600)):
+    bounds = (("viewer_hz", 1, 100), ("status_hz", 1, 60), ("timeout_s", 0, 3600))
+    for name, low, high in (*bounds, ("input_delay_s", 0, 1), ("attempt", 1, 10**6)):
         value = getattr(parsed, name)
         if name == "timeout_s" and value is None:
             continue

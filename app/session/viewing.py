@@ -44,6 +44,7 @@ class Viewing:
         camera: str,
         hide: tuple[str, ...],
         rate_hz: float,
+        show_objects: bool = True,
         on_error: Callable[[Exception], None],
     ) -> None:
         """Draw a scene.
@@ -56,6 +57,7 @@ class Viewing:
             camera: First camera preset.
             hide: What a study hides.
             rate_hz: Most updates a second.
+            show_objects: Whether objects and the target's ring are drawn.
             on_error: Told about a failed update, in the view's thread.
 
         Raises:
@@ -64,7 +66,10 @@ class Viewing:
         """
         self._server = server
         self._locked = {k: v for part in hide for k, v in HIDDEN_LAYERS.get(part, {}).items()}
+        self._show_objects = show_objects
         self._viewer = Viewer(server, scene, theme)
+        if not show_objects:
+            self._viewer.hide_objects()
         self._viewer.set_layers({**layers, **self._locked})
         self._viewer.set_camera(camera)
         self._trial: object = None
@@ -138,7 +143,7 @@ class Viewing:
         if trial != self._trial:
             self._trial = trial
             self._viewer.clear_path()
-            self._viewer.set_target(frame.view.target)
+            self._viewer.set_target(frame.view.target if self._show_objects else None)
         self._viewer.update(frame.record, frame.goals, frame.settings)
         self.state = self._look()
 

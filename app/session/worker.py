@@ -81,6 +81,7 @@ def first_settings(spec: WorkerSpec, options: SessionOptions) -> AssistanceSetti
 def _run(spec: WorkerSpec, channel: Channel, inbox: Inbox, pacer: Pacer) -> str:
     """Set up and loop; returns why it ended."""
     options = parse_options(spec.options)
+    inbox.delay_s = options.input_delay_s
     settings = first_settings(spec, options)
     scene = load_scene(spec.scene)
     folder = None
@@ -122,6 +123,7 @@ def _serve(
         camera=options.camera,
         hide=options.hide,
         rate_hz=options.viewer_hz,
+        show_objects=options.show_objects,
         on_error=failures.tell,
     )
     sender = _Status(channel, viewing, options.hide)

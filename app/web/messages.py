@@ -47,10 +47,12 @@ class InputMessage(_Strict):
 
 
 class EventMessage(_Strict):
-    """The page lost or gained the person's attention."""
+    """The page lost or gained the person's attention, the whole screen, or its frame rate."""
 
     type: Literal["event"]
-    name: Literal["blur", "focus", "hidden", "visible"]
+    name: Literal[
+        "blur", "focus", "hidden", "visible", "fullscreen", "windowed", "frames_low", "frames_ok"
+    ]
 
 
 class PingMessage(_Strict):

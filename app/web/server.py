@@ -36,7 +36,8 @@ def create_app(
     Args:
         config: Validated settings.
         workers: The pool that starts and ends worker processes.
-        routes: Further routes of other rooms (studies, review), served behind the same guard.
+        routes: Further routes of other rooms (studies, review), served behind the same guard;
+            they come before our own, so that a study may serve its page at "/".
     """
     registry = SessionRegistry(config, workers)
     pages = Pages(registry, config)
@@ -52,6 +53,7 @@ def create_app(
 
     application = Starlette(
         routes=[
+            *routes,
             Route("/", pages.index),
             Route("/api/health", pages.health),
             Route("/watch/{key}", pages.watch),
@@ -59,7 +61,6 @@ def create_app(
             WebSocketRoute("/view/{id}", ViewSockets(registry, config).endpoint),
             WebSocketRoute("/input/{id}", InputSockets(registry, config).endpoint),
             Mount("/static", _Static(directory=STATIC, check_dir=False)),
-            *routes,
         ],
         middleware=[Middleware(HostGuard, config=config)],
         lifespan=lifespan,

@@ -8,7 +8,10 @@ from typing import Any, Literal
 import msgspec
 
 from app import __version__
+from app.errors import AppError
+from app.session.spec import WorkerSpec
 from app.web.channel import Head
+from app.web.config import ServerConfig
 from app.web.outbox import Outbox
 from app.web.worker import Ending, Worker
 
@@ -23,6 +26,10 @@ HANDOVER_S = 3.0
 """A page that watched takes over when the page in control has been gone for this long [s]."""
 
 logger = logging.getLogger("hindsight.web")
+
+
+class StartRefusedError(AppError):
+    """This session may not start a worker now."""
 
 
 class Client:
@@ -52,10 +59,34 @@ class Session:
         """Workers started so far."""
         self.clients: dict[str, Client] = {}
         self.control: Client | None = None
+        self.shares_watch = True
+        """Whether its own page is told the read-only link."""
         self.sockets = 0
         """Open view sockets."""
         self._joined = 0
         self._control_lost_s = float("-inf")
+
+    @property
+    def start_key(self) -> str:
+        """What the bound on worker starts counts by."""
+        return self.id
+
+    def worker_spec(self, config: ServerConfig) -> WorkerSpec:
+        """What the next worker is told; studies decide this themselves.
+
+        Raises:
+            StartRefusedError: If there is nothing to run now.
+        """
+        return WorkerSpec(
+            id=self.id,
+            scene=config.scene,
+            settings=dict(config.settings),
+            sessions=str(config.sessions),
+            study=config.study,
+            participant=self.id,
+            session=str(self.runs + 1),
+            options={**config.options, "watch": self.watch_path},
+        )
 
     @property
     def watch_path(self) -> str:
@@ -166,7 +197,7 @@ class Session:
             "version": __version__,
             "control": client is self.control,
             "view": f"/view/{self.id}/",
-            "watch": self.watch_path if client.role == "owner" else None,
+            "watch": self.watch_path if self.shares_watch and client.role == "owner" else None,
         }
         client.outbox.put(to_json(hello))
 

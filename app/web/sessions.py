@@ -6,12 +6,11 @@ import logging
 import time
 from collections import OrderedDict
 
-from app.errors import AppError
 from app.session.spec import WorkerSpec
 from app.web.config import ServerConfig
 from app.web.housekeeping import complete_session
 from app.web.limits import KeyedBuckets
-from app.web.session import Session
+from app.web.session import Session, StartRefusedError
 from app.web.worker import Ending, Worker
 from app.web.workers import WorkerPool
 
@@ -21,11 +20,8 @@ RESTARTS_PER_S = 0.05
 RESTART_BURST = 4
 """Workers one session may start: a worker that dies at once must not be started in a circle."""
 
+__all__ = ["SessionRegistry", "StartRefusedError"]
 logger = logging.getLogger("hindsight.web")
-
-
-class StartRefusedError(AppError):
-    """This session may not start a worker now."""
 
 
 class SessionRegistry:
@@ -55,7 +51,10 @@ class SessionRegistry:
 
     def issue(self) -> Session:
         """A new session, without a worker as yet."""
-        session = Session()
+        return self.add(Session())
+
+    def add(self, session: Session) -> Session:
+        """Take in a session, also one of another room's kind."""
         self._by_id[session.id] = session
         if len(self._by_id) > MAX_IDLE:
             for other in self._by_id.values():
@@ -87,20 +86,11 @@ class SessionRegistry:
         """
         if session.worker is not None:
             return
-        if not self.workers.full and not self._restarts.take(session.id):
+        if not self.workers.full and not self._restarts.take(session.start_key):
             raise StartRefusedError(
                 "this session has been started too often in the last minute; wait a minute"
             )
-        spec = WorkerSpec(
-            id=session.id,
-            scene=self._config.scene,
-            settings=dict(self._config.settings),
-            sessions=str(self._config.sessions),
-            study=self._config.study,
-            participant=session.id,
-            session=str(session.runs + 1),
-            options={**self._config.options, "watch": session.watch_path},
-        )
+        spec = session.worker_spec(self._config)
 
         def gone(worker: Worker, ending: Ending) -> None:
             session.worker_gone(worker, ending)

@@ -66,6 +66,11 @@ class ObjectNodes:
             top = float((corners @ rotation.reshape(3, 3)[2]).max())
             self._outbox.place(tag, pose[:3] + [0.0, 0.0, top + TAG_LIFT_M])
 
+    def hide(self) -> None:
+        """Draw no objects; they are still there."""
+        for frame in (*self._frames, *self._tags):
+            self._outbox.put(frame, "visible", False)
+
     def set_tags_visible(self, visible: bool) -> None:
         """Show or hide the frames that tags hang on."""
         for tag in self._tags:

@@ -115,6 +115,12 @@ class Viewer:
             self._server.flush()
         self._request_slice()
 
+    def hide_objects(self) -> None:
+        """Draw no objects, for practice at an empty table."""
+        with self._server.atomic():
+            self._objects.hide()
+        self._server.flush()
+
     def set_layers(self, changes: Mapping[str, Any]) -> dict[str, Any]:
         """Change some of the layers.
 
