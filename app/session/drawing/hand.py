@@ -17,6 +17,7 @@ SLOWEST_M_S = 0.003  # below this no arrow is drawn
 RING_M = 0.02
 LIFT_M = 0.006  # [m] of the ring above the table, clear of the value slice
 HEIGHT_STEP_M = 2.0**-9
+ARROW_WAIT = 2  # updates
 
 
 def arrow_tip(velocity: np.ndarray) -> np.ndarray | None:
@@ -42,7 +43,7 @@ class HandNodes:
 
     The arrows hang on a frame that follows the hand, so their points change with the command only,
     and points are the longest messages of a tick: an arrow whose points were sent in the update
-    before waits for the next one, so that 60 updates a second move each arrow 30 times.
+    before waits for two, so that 60 updates a second move each arrow 20 times.
     """
 
     def __init__(self, server: viser.ViserServer, theme: Theme, outbox: Outbox):
@@ -68,7 +69,7 @@ class HandNodes:
             )
             for name, colour in (("user", theme.user), ("assist", theme.assist))
         }
-        self._just_sent: set[str] = set()
+        self._waits = dict.fromkeys(self._arrows, 0)
         self._plumb = scene.add_frame("/hindsight/plumb", show_axes=False)
         self._line = scene.add_line_segments(
             "/hindsight/plumb/line",
@@ -110,10 +111,10 @@ class HandNodes:
         for name, twist in (("user", direct), ("assist", assistance)):
             tip = None if twist is None else arrow_tip(np.asarray(twist[:3], dtype=np.float64))
             handle = self._arrows[name]
-            if tip is None or name in self._just_sent:
-                self._just_sent.discard(name)
+            if tip is None or self._waits[name] > 0:
+                self._waits[name] = max(0, self._waits[name] - 1)
             elif self._outbox.points(handle, np.stack([np.zeros(3), tip])[None]):
-                self._just_sent.add(name)
+                self._waits[name] = ARROW_WAIT
             self._outbox.put(handle, "visible", tip is not None)
         self._outbox.place(self._plumb, [hand[0], hand[1], 0.0])
         height = float(np.round(max(hand[2], 0.0) / HEIGHT_STEP_M) * HEIGHT_STEP_M)
