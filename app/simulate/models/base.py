@@ -116,7 +116,7 @@ class User(ABC):
         self._rng = rng
         self._late = round(parameters["delay_s"] / DECISION_S)
         self._seen: deque[Pose] = deque(maxlen=self._late + _VELOCITY_LOOKS + 1)
-        self._given: deque[Array] = deque(maxlen=self._late + _VELOCITY_LOOKS + 1)
+        self._given: deque[Array] = deque(maxlen=self._late + _VELOCITY_LOOKS)
         self._looks = 0
         self._kept = float(np.exp(-DECISION_S / parameters["noise_time_s"]))
         self._fresh = float(np.sqrt(1.0 - self._kept**2))
