@@ -36,7 +36,8 @@ export function watchGamepads(store, input, actions, say) {
 
   const meet = (pad) => {
     const profile = loadProfile(pad);
-    pads.set(pad.index, { id: pad.id, profile, pressed: [], armed: isAtRest(pad, profile) });
+    // A browser shows a pad once it is used: what it is pushed to then is meant.
+    pads.set(pad.index, { id: pad.id, profile, pressed: [], armed: true });
     say("info", `Gamepad connected: ${shortName(pad.id)}`);
     if (pad.mapping !== "standard" && !isKnown(pad)) {
       say("warn", "This gamepad has no standard layout. Set it up under the device name, top right.");
@@ -51,7 +52,7 @@ export function watchGamepads(store, input, actions, say) {
     }
     const { profile } = known;
     const axes = readAxes(pad, profile);
-    // After a blur, or where it comes with a stick held down, a pad counts once it was at rest.
+    // After a blur a pad counts once it was at rest.
     known.armed ||= isAtRest(pad, profile);
     input.set(`gamepad:${pad.index}`, "gamepad", shortName(pad.id), known.armed && !paused ? axes : [0, 0, 0, 0], profile.deadZone);
     for (const name of BUTTONS) {
