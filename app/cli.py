@@ -101,14 +101,41 @@ def _sessions(args: argparse.Namespace) -> None:
 
 
 def _bench_options(parser: Arguments) -> None:
-    parser.add_argument("what", nargs="?", choices=("all", "assist"), default="all")
+    parser.add_argument(
+        "what",
+        nargs="?",
+        choices=("all", "assist", "capacity", "soak"),
+        default="all",
+        help="all: loop, recording, view, latency; capacity: sessions this machine bears; "
+        "soak: sessions that run for long",
+    )
     parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
+    parser.add_argument(
+        "--sessions",
+        type=int,
+        nargs="+",
+        metavar="N",
+        help="sessions at once (capacity: several numbers are tried in turn; soak: 4)",
+    )
+    parser.add_argument(
+        "--seconds", type=_positive, default=15.0, help="capacity: how long each number is tried"
+    )
+    parser.add_argument("--minutes", type=_positive, default=60.0, help="soak: how long")
+    parser.add_argument(
+        "--keep", action="store_true", help="capacity: let servers here offer what was measured"
+    )
 
 
 def _bench(args: argparse.Namespace) -> None:
     from app.bench.command import bench, format_table
 
-    figures = bench(args.what)
+    figures = bench(
+        args.what,
+        sessions=args.sessions or (),
+        seconds=args.seconds,
+        minutes=args.minutes,
+        keep=args.keep,
+    )
     print(json.dumps(figures, indent=2) if args.json else format_table(figures))
 
 

@@ -1,25 +1,50 @@
 """`hindsight bench`: every figure of this machine in one run, as a table or JSON."""
 
 import sys
+from collections.abc import Sequence
 from typing import Any
 
 Figures = dict[str, dict[str, Any]]
 
 
-def bench(what: str) -> Figures:
-    """Run the benches; names map to {median, p99, unit}, for "assist" as its own docstring says.
+def bench(
+    what: str,
+    *,
+    sessions: Sequence[int] = (),
+    seconds: float = 15.0,
+    minutes: float = 60.0,
+    keep: bool = False,
+) -> Figures:
+    """Run the benches; names map to {median, p99, unit}, for others as their docstrings say.
 
     The browser's latency is left out, with a line saying so, where there is no browser.
+
+    Args:
+        what: "all", "assist", "capacity" or "soak".
+        sessions: Sessions at once, for capacity and soak; empty: their own choice.
+        seconds: How long capacity tries each number [s].
+        minutes: How long the soak runs.
+        keep: Whether the measured capacity is kept for servers on this machine.
+
+    Raises:
+        AppError: If a number is out of range, or a session did not survive its bench.
     """
     if what == "assist":
         from app.bench.assist import bench_assist
 
         return bench_assist()
+    if what == "capacity":
+        from app.bench.capacity import SIZES, bench_capacity
+
+        return bench_capacity(sessions or SIZES, seconds, keep=keep)
+    if what == "soak":
+        from app.bench.soak import bench_soak
+
+        return bench_soak(minutes, sessions[0] if sessions else 4)
+    from app.bench.latency import bench_latency
     from app.bench.loop import bench_loop
     from app.bench.record import bench_record
     from app.bench.scene import bench_scene
-
-    from app.bench.latency import bench_latency
 
     figures: Figures = {}
     for part in (bench_loop, bench_record, bench_scene, bench_latency):
