@@ -7,23 +7,30 @@ import numpy as np
 from app.core.types import Array
 
 
+_LEFT = np.zeros((4, 4, 4))
+"""L(p) = Σ_i p_i _LEFT[i], the products of the units 1, i, j, k from the left."""
+_LEFT[0] = np.eye(4)
+_LEFT[1][[0, 1, 2, 3], [1, 0, 3, 2]] = -1.0, 1.0, -1.0, 1.0
+_LEFT[2][[0, 1, 2, 3], [2, 3, 0, 1]] = -1.0, 1.0, 1.0, -1.0
+_LEFT[3][[0, 1, 2, 3], [3, 2, 1, 0]] = -1.0, -1.0, 1.0, 1.0
+
+_TURN = np.zeros((4, 4, 3, 3))
+"""R(p) = 1 + Σ_ij p_i p_j _TURN[i, j]."""
+for _i, _j, _k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+    _TURN[_i + 1, _i + 1][[_j, _k], [_j, _k]] = -2.0
+    _TURN[_i + 1, _j + 1][[_i, _j], [_j, _i]] = 2.0
+    _TURN[0, _k + 1][[_i, _j], [_j, _i]] = -2.0, 2.0
+
+
 def matrices(quaternion: Array) -> Array:
     """Rotation matrices of unit quaternions, shape (n, 4) to (n, 3, 3)."""
-    w, x, y, z = quaternion.T
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.array(rows).transpose(2, 0, 1)
+    squares = quaternion[:, :, None] * quaternion[:, None, :]
+    return np.eye(3) + (squares.reshape(-1, 16) @ _TURN.reshape(16, 9)).reshape(-1, 3, 3)
 
 
 def left_matrices(quaternion: Array) -> Array:
     """L(p) with L(p) q = p ⊗ q, shape (n, 4) to (n, 4, 4)."""
-    w, x, y, z = quaternion.T
-    return np.array([[w, -x, -y, -z], [x, w, -z, y], [y, z, w, -x], [z, -y, x, w]]).transpose(
-        2, 0, 1
-    )
+    return (quaternion @ _LEFT.reshape(4, 16)).reshape(-1, 4, 4)
 
 
 def quaternions(rotation: Array) -> Array:
