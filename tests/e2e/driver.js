@@ -85,7 +85,7 @@ window.driver = (() => {
         [seen, seenAt] = [hand.join(), performance.now()];
       }
       // Whoever sees the hand jump pushes less: no more than 2 cm between two looks.
-      const reach = clip(0.02 / (0.2 * pace), 1);
+      const reach = Math.max(0.3, Math.min(1, 0.02 / (0.2 * pace)));  // well beyond the dead zone
       const object = look(`object-${name}`);
       const [dx, dy, dz] = object.map((value, i) => value - hand[i]);
       // First beside and behind the object, then straight in.
