@@ -6,7 +6,6 @@ import numpy as np
 
 from app.core.types import Array
 
-
 _LEFT = np.zeros((4, 4, 4))
 """L(p) = Σ_i p_i _LEFT[i], the products of the units 1, i, j, k from the left."""
 _LEFT[0] = np.eye(4)
