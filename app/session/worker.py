@@ -59,6 +59,9 @@ def main(spec: WorkerSpec, sock: socket.socket) -> None:
     except AppError as error:
         logger.error("session %s: %s", spec.id, error)
         reason = str(error)
+    except MemoryError:
+        logger.exception("session %s has no memory", spec.id)
+        reason = "This machine has no memory left for the session."
     except Exception:
         logger.exception("session %s failed", spec.id)
     finally:

@@ -172,6 +172,10 @@ class Session:
             client.outbox.put(to_json({"type": "ended", "reason": reason}))
             client.outbox.close(GONE_CODE, "ended")
 
+    def say(self, level: Literal["info", "warn", "error"], text: str) -> None:
+        """Tell every page something."""
+        self._broadcast(to_json({"type": "notice", "level": level, "text": text}))
+
     def _give_control(self, client: Client) -> None:
         previous, self.control = self.control, client
         if self.worker is not None:

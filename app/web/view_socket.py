@@ -15,6 +15,7 @@ from app.web.session import Session
 from app.web.sessions import SessionRegistry
 from app.web.view_messages import FrameError, filter_frame
 from app.web.viewer_page import subprotocol
+from app.web.worker import Worker
 
 READY_WAIT_S = 4.0
 """viser's client gives a handshake up after 5 s and tries again."""
@@ -26,6 +27,12 @@ MAX_SOCKETS = 16
 """Open viewers of one session."""
 CONNECTS_PER_S = 5.0
 CONNECT_BURST = 60
+VIEWER_GONE = 1011
+"""Websocket close code where viser does not answer, or no longer."""
+SURE_S = 1.0
+"""A worker that has died is known to be dead by then [s]."""
+NOTICES_PER_S = 0.05
+"""viser's client tries again every second; its page is told three times a minute."""
 
 logger = logging.getLogger("hindsight.web")
 _refused_log = QuietLog(logger)
@@ -38,6 +45,7 @@ class ViewSockets:
         self._registry = registry
         self._config = config
         self._connects = KeyedBuckets(CONNECTS_PER_S, CONNECT_BURST)
+        self._notices = KeyedBuckets(NOTICES_PER_S, 1)
 
     async def endpoint(self, socket: WebSocket) -> None:
         """One connection, from its handshake to its end."""
@@ -56,11 +64,20 @@ class ViewSockets:
             await deny(socket, 503, "the simulation is not running")
         else:
             session.sockets += 1
+            worker = session.worker
+            assert worker is not None
             try:
-                assert session.worker is not None
-                await proxy_view(socket, session.worker.viewer_port, session.id)
+                code = await proxy_view(socket, worker.viewer_port, session.id)
             finally:
                 session.sockets -= 1
+            if code == VIEWER_GONE:
+                await self._tell(session, worker)
+
+    async def _tell(self, session: Session, worker: Worker) -> None:
+        """Say that the picture is gone, unless the whole worker is, which is said otherwise."""
+        await asyncio.sleep(SURE_S)
+        if session.worker is worker and worker.alive and self._notices.take(session.id):
+            session.say("error", "The picture is gone; the robot still obeys. Reload the page.")
 
 
 async def _worker_ready(session: Session) -> bool:
@@ -74,8 +91,12 @@ async def _worker_ready(session: Session) -> bool:
     return worker.alive and worker.viewer_port > 0
 
 
-async def proxy_view(socket: WebSocket, port: int, session_id: str) -> None:
-    """Carry frames between a browser that may see a view and the viser server on a local port."""
+async def proxy_view(socket: WebSocket, port: int, session_id: str) -> int:
+    """Carry frames between a browser that may see a view and the viser server on a local port.
+
+    Returns:
+        The close code; `VIEWER_GONE` also where there was no connection.
+    """
     try:
         upstream = await connect(
             f"ws://127.0.0.1:{port}",
@@ -89,8 +110,8 @@ async def proxy_view(socket: WebSocket, port: int, session_id: str) -> None:
     except (OSError, TimeoutError, WebSocketException) as error:
         _refused_log.warning(f"session {session_id}: the viewer does not answer: {error}")
         await deny(socket, 502, "the viewer does not answer")
-        return
-    code, reason = 1011, "the viewer is gone"
+        return VIEWER_GONE
+    code, reason = VIEWER_GONE, "the viewer is gone"
     try:
         await socket.accept(subprotocol=upstream.subprotocol)
         down = asyncio.create_task(_pump_down(upstream, socket))
@@ -108,6 +129,7 @@ async def proxy_view(socket: WebSocket, port: int, session_id: str) -> None:
             await socket.close(code, reason)
         except (RuntimeError, WebSocketDisconnect):
             pass  # the browser was first
+    return code
 
 
 async def _pump_down(upstream: ClientConnection, socket: WebSocket) -> tuple[int, str]:
@@ -120,7 +142,7 @@ async def _pump_down(upstream: ClientConnection, socket: WebSocket) -> tuple[int
         pass
     code, reason = upstream.close_code, upstream.close_reason
     # 1002 is viser's "version mismatch", which its client shows
-    return (1002, reason or "") if code == 1002 else (1011, "the viewer is gone")
+    return (1002, reason or "") if code == 1002 else (VIEWER_GONE, "the viewer is gone")
 
 
 async def _pump_up(
@@ -149,4 +171,4 @@ async def _pump_up(
         try:
             await upstream.send(passed)
         except ConnectionClosed:
-            return 1011, "the viewer is gone"
+            return VIEWER_GONE, "the viewer is gone"

@@ -166,7 +166,7 @@ class Worker:
     def _explain(self, code: int | None) -> Ending:
         was_ready = self.viewer_port > 0
         how = _describe(code)
-        if self._hung:
+        if self._hung or code == -signal.SIGALRM:  # see child.DEAD_MAN_S
             logger.warning("worker %s fell silent and was killed", self.spec.id)
             text = "The simulation stopped answering and was ended."
             return Ending("hung", text, self._announced)
