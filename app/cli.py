@@ -104,7 +104,7 @@ def _bench_options(parser: Arguments) -> None:
     parser.add_argument(
         "what",
         nargs="?",
-        choices=("all", "assist", "capacity", "soak"),
+        choices=("all", "assist", "simulate", "capacity", "soak"),
         default="all",
         help="all: loop, recording, view, latency; capacity: sessions this machine bears; "
         "soak: sessions that run for long",

@@ -20,7 +20,7 @@ def bench(
     The browser's latency is left out, with a line saying so, where there is no browser.
 
     Args:
-        what: "all", "assist", "capacity" or "soak".
+        what: "all", "assist", "simulate", "capacity" or "soak".
         sessions: Sessions at once, for capacity and soak; empty: their own choice.
         seconds: How long capacity tries each number [s].
         minutes: How long the soak runs.
@@ -33,6 +33,10 @@ def bench(
         from app.bench.assist import bench_assist
 
         return bench_assist()
+    if what == "simulate":
+        from app.bench.simulate import bench_simulate
+
+        return bench_simulate()
     if what == "capacity":
         from app.bench.capacity import SIZES, bench_capacity
 

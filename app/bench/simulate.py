@@ -14,7 +14,7 @@ from app.simulate.pool import run_trials
 from app.simulate.trial import Runner
 
 METHODS = "blend,policy,yielding"
-KINEMATIC_TRIALS, PHYSICS_TRIALS, POOL_TRIALS = 40, 6, 120
+KINEMATIC_TRIALS, PHYSICS_TRIALS, POOL_TRIALS = 20, 4, 120
 
 
 def bench_simulate() -> dict[str, dict[str, Any]]:

@@ -130,9 +130,13 @@ def test_the_lazy_let_the_robot_work_only_while_it_does():
 def test_fighters_push_against_motion_aside():
     """The others do not."""
     aside = moving([0.0, 0.06, 0.0])
-    calm = {"noise": 0.0, "standoff_m": 0.0, "axis_preference": 1.0}
-    assert pushed(watch(make_user("fight", **calm), aside)[-1])[1] < -0.2
-    assert pushed(watch(make_user("continue", **calm), aside)[-1])[1] == pytest.approx(0.0)
+
+    def sideways(model: str) -> float:
+        user = make_user(model, noise=0.0, standoff_m=0.0, axis_preference=1.0)
+        return float(pushed(watch(user, aside)[-1])[1])
+
+    assert sideways("fight") < -0.2
+    assert sideways("continue") == pytest.approx(0.0)
 
 
 def test_a_changed_mind_goes_elsewhere_first():
