@@ -1,0 +1,63 @@
+"""A page whose browser sleeps, and a line that breaks again and again."""
+
+import pytest
+
+from tests.page.conftest import OpenPage, newest_axes
+from tests.page.fake_server import FakeServer
+
+pytestmark = [pytest.mark.browser, pytest.mark.timeout(600)]
+CONNECTED = '[data-testid="connection"][data-state="connected"]'
+
+
+@pytest.mark.parametrize("dropped", [False, True], ids=["line-held", "line-lost"])
+def test_a_frozen_page_wakes_up_where_it_was(
+    fake: FakeServer, open_page: OpenPage, dropped: bool
+) -> None:
+    """Frozen as by a closed lid with the stick pushed: it comes back by itself, and steers."""
+    page = open_page()
+    page.evaluate("pointer('right', 'pointerdown', 0, 0); pointer('right', 'pointermove', 1, 0)")
+    fake.wait(lambda: newest_axes(fake) == (0, 0, 1, 0), "pushed")
+    devtools = page.context.new_cdp_session(page)
+    devtools.send("Page.setWebLifecycleState", {"state": "frozen"})
+    page_count = fake.connections
+    if dropped:
+        fake.drop()
+    devtools.send("Page.setWebLifecycleState", {"state": "active"})
+    page.wait_for_selector(CONNECTED)
+    if dropped:
+        fake.wait(lambda: fake.connections > page_count and fake.pages == 1, "it is back")
+    fake.received.clear()
+    page.evaluate("pointer('right', 'pointerup', 1, 0)")
+    fake.wait(lambda: fake.of_type("input"), "it speaks")
+    page.keyboard.down("r")
+    fake.wait(lambda: newest_axes(fake) == (0, 1, 0, 0), "and steers")
+    numbers = [m["seq"] for m in fake.of_type("input")]
+    assert numbers == sorted(set(numbers))
+
+
+@pytest.mark.slow
+def test_fifty_reconnects_leave_one_line_and_no_litter(
+    fake: FakeServer, open_page: OpenPage
+) -> None:
+    """One socket at the end, each number once, and no element more than after the first drop."""
+    page = open_page()
+
+    def drop() -> None:
+        before = fake.connections
+        fake.drop()
+        fake.wait(lambda: fake.pages == 1 and fake.connections > before, "it comes back")
+        page.wait_for_selector(CONNECTED)
+
+    def elements() -> int:
+        return page.evaluate("document.querySelectorAll('*').length")
+
+    drop()
+    page.wait_for_selector(".notice", state="detached")
+    before = elements()
+    for _ in range(50):
+        drop()
+    page.wait_for_selector(".notice", state="detached", timeout=60_000)
+    assert elements() == before
+    assert fake.pages == 1
+    numbers = [m["seq"] for m in fake.of_type("input")]
+    assert len(numbers) > 50 and len(set(numbers)) == len(numbers)
