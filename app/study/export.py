@@ -58,27 +58,29 @@ def export_study(folder: Path, out: Path | None = None, *, with_comments: bool =
     if target.exists() and any(target.iterdir()):
         raise StudyError(f"{target} exists and is not empty; choose another --out")
     with lock_study(root.parent, root.name):
-        return _export(root, target, with_comments)
+        store = open_folder(root)
+        try:
+            return export_store(store, target, with_comments=with_comments)
+        finally:
+            store.close()
 
 
-def _export(root: Path, target: Path, with_comments: bool) -> Exported:
-    store = open_folder(root)
-    try:
-        write_tables(store)
-        target.joinpath("data").mkdir(parents=True, exist_ok=True)
-        for name in (STUDY_FILE, "README.md", "dataset_description.json"):
-            shutil.copyfile(root / name, target / name)
-        for what in ("participants", "trials", "survey"):
-            path = table_path(store, what)
-            shutil.copyfile(path, target / "data" / path.name)
-        people = sorted(store.people.values(), key=lambda person: person.id)
-        trials = sum(_copy_person(person, root, target) for person in people)
-        notes = ["Times of day were left out; every trial begins at midnight of its day."]
-        if with_comments:
-            _write_comments(store, people, target)
-            notes.append("Comments are included: read them for what could identify somebody.")
-    finally:
-        store.close()
+def export_store(store: Store, target: Path, *, with_comments: bool) -> Exported:
+    """The same of an open store, also while it is in use."""
+    root = store.root.resolve()
+    write_tables(store)
+    target.joinpath("data").mkdir(parents=True, exist_ok=True)
+    for name in (STUDY_FILE, "README.md", "dataset_description.json"):
+        shutil.copyfile(root / name, target / name)
+    for what in ("participants", "trials", "survey"):
+        path = table_path(store, what)
+        shutil.copyfile(path, target / "data" / path.name)
+    people = sorted(store.people.values(), key=lambda person: person.id)
+    trials = sum(_copy_person(person, store.root, target) for person in people)
+    notes = ["Times of day were left out; every trial begins at midnight of its day."]
+    if with_comments:
+        _write_comments(store, people, target)
+        notes.append("Comments are included: read them for what could identify somebody.")
     return Exported(target, len(people), trials, tuple(notes))
 
 

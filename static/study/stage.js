@@ -39,6 +39,7 @@ export function createStage(page) {
   let goAt = 0;
   let startedLog = 0;
   let paused = false;
+  let refusal = ""; // why there is no robot just now
   let active = false;
 
   const line = { get open() { return socket?.open ?? false; }, sendInput: (fields) => socket?.sendInput(fields), sendEvent: (name) => socket?.sendEvent(name) };
@@ -91,11 +92,15 @@ export function createStage(page) {
   function receive(message) {
     if (message.type === "status") store.update({ status: message });
     else if (message.type === "hello") {
+      refusal = "";
       store.update({ hello: message });
       if (hellos++ === 0) viewer.path = ""; // another robot behind the same path: draw it anew
       viewer.open(message.view);
       input.greet();
-    } else if (message.type === "study" || message.type === "ended") page.changed();
+    } else if (message.type === "ended") {
+      if (hellos === 0) refusal = message.reason;
+      page.changed();
+    } else if (message.type === "study") page.changed();
   }
 
   const trial = () => store.state.status?.trial;
@@ -125,6 +130,7 @@ export function createStage(page) {
   /** What the card in the middle says now: severity, title, line, buttons. */
   function content() {
     const { connection, hello } = store.state;
+    if (refusal && !hello) return ["info", "Please wait a moment", `${sentence(refusal)} This page goes on by itself.`, []];
     if (connection.state === "lost") return ["warn", "The robot is not there just now", connection.reason || "This page tries again by itself.", [again]];
     if (connection.state !== "connected") return connection.before ? ["warn", "Connection lost. The robot has stopped.", "This trial will be repeated.", []] : ["info", "Getting the robot ready …", "", []];
     if (hello?.control === false) return ["info", "This study is open in another tab", "Please go on there. This tab takes over when the other one is closed.", []];
@@ -187,6 +193,10 @@ export function createStage(page) {
       return store.state.connection.state === "connected";
     },
   };
+}
+
+function sentence(text) {
+  return `${text.charAt(0).toUpperCase()}${text.slice(1).replace(/[.\s]*$/, "")}.`;
 }
 
 /** Close a line for good; it must not come back by itself. */

@@ -62,7 +62,7 @@ class Api:
             return JSONResponse({"error": complaint}, 403)
         if request.headers.get("content-type", "").partition(";")[0] != "application/json":
             return JSONResponse({"error": "content-type: valid is application/json"}, 415)
-        body = await _body(request)
+        body = await read_body(request)
         if body is None:
             return JSONResponse({"error": f"at most {ask.MAX_BODY_BYTES} bytes"}, 413)
         person = participant_of(request, self._host)
@@ -216,7 +216,7 @@ class Api:
         return {"completion": code, "redirect": completion.redirect, "withdrawal": withdrawal}
 
 
-async def _body(request: Request) -> bytes | None:
+async def read_body(request: Request) -> bytes | None:
     """The body; None where it is too long."""
     body = b""
     async for chunk in request.stream():

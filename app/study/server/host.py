@@ -121,6 +121,8 @@ class Host:
             AnswerError: Naming what is missing or not valid.
             ProtocolError: If this page is not being answered.
         """
+        if page != page_name(person.state.step):
+            raise ProtocolError(f"answers of {page}; asked now: {page_name(person.state.step)}")
         items = self.items(person, page)
         answers = check_answers(items, values)
         await self._keep_texts(person, page, items, answers)

@@ -10,6 +10,7 @@ from app.study.server.cookies import (
     arrival_of,
     forget,
     keep_arrival,
+    keep_participant,
     participant_of,
 )
 from app.study.server.host import Host
@@ -53,6 +54,11 @@ class StudyPages:
             about["fast"] = True
         if query.get("pilot") and host.is_pilot_key(query["pilot"]):
             about["pilot"] = True
+        resumed = host.store.by_token(query.get("resume", ""))
+        if resumed is not None:
+            token = host.store.renew_token(resumed.id)  # the link works once
+            keep_participant(request, response, host, f"{resumed.id}.{token}")
+            return response
         keep_arrival(request, response, host, about)
         person = participant_of(request, host)
         if "next" in query and (person is None or not person.state.is_open):

@@ -9,8 +9,10 @@ from starlette.routing import Route
 from app.study.load import load_study, study_path
 from app.study.lock import lock_study
 from app.study.server.api import Api
+from app.study.server.desk import Desk
 from app.study.server.host import Host
 from app.study.server.pages import StudyPages
+from app.study.server.password import read_hash
 from app.study.store import Store
 from app.study.tables import copy_study_file, write_tables
 from app.web.config import ServerConfig
@@ -39,12 +41,17 @@ class HostOptions:
 
 def make_application(host: Host) -> Starlette:
     """The web application of a study: its page in place of the live one."""
-    api, pages = Api(host), StudyPages(host)
+    api, pages, desk = Api(host), StudyPages(host), Desk(host)
     routes = [
         Route("/", pages.index),
         Route("/withdraw", pages.withdraw),
         Route("/api/study", api.get, methods=["GET"]),
         Route("/api/study", api.post, methods=["POST"]),
+        Route("/desk", desk.page),
+        Route("/desk/watch/{id}", desk.watch),
+        Route("/desk/download", desk.download),
+        Route("/api/desk", desk.get, methods=["GET"]),
+        Route("/api/desk", desk.post, methods=["POST"]),
     ]
     application = create_app(host.config, WorkerPool(host.config), routes)
     host.registry = application.state.registry
@@ -75,6 +82,8 @@ def host_study(options: HostOptions) -> None:
             application = make_application(host)
             print(f"The study {study.name!r} is at {url}  (Ctrl+C ends it)", flush=True)
             print(f"Pilots, who do not count: {url}/?pilot={host.pilot_key}", flush=True)
+            desk = "" if read_hash(config.sessions) else " (first: hindsight study password)"
+            print(f"The experimenter's desk: {url}/desk{desk}", flush=True)
             if options.test:
                 print(f"Test run, data are marked; short: {url}/?fast=1", flush=True)
             serve_until_signal(HindsightServer(config, application), listener)

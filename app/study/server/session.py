@@ -154,11 +154,12 @@ class StudySession(Session):
         self._log, self._moving, self._over = 0, False, False
         self.end_worker()
 
-    def restart(self, reason: str) -> None:
-        """The experimenter's doing: the running attempt does not count, and is begun again."""
-        if self._log and not self._over:
-            log, self._log, self._moving = self._log, 0, False
-            self._start(self._interrupt(log, reason))
+    async def interrupt(self, reason: str) -> None:
+        """Another's doing: the running attempt does not count, and the worker ends."""
+        running = self.person.state.running
+        self.drop_trial()
+        if running is not None:
+            await self._host.happen(self.participant, ended(running.started, "interrupted", reason))
 
     def tell(self, **fields: Any) -> None:
         """Say something to all pages of this participant."""

@@ -125,8 +125,7 @@ def _trial(host: Host, person: Person, task: Task) -> Message:
     state, study = person.state, host.store.study
     condition = condition_of(study, task)
     running = state.running
-    last = state.attempts[-1] if state.attempts else None
-    failed = last is not None and last.started.index == state.at and last.outcome
+    before = [a.outcome for a in state.attempts if a.started.index == state.at and a.outcome]
     return {
         "session": host.session(person.id).id,
         "part": task.part,
@@ -136,7 +135,7 @@ def _trial(host: Host, person: Person, task: Task) -> Message:
         "of": task.of,
         "attempt": state.next_attempt if running is None else running.started.attempt,
         "log": running.started.trial if running is not None else 0,
-        "again": last.outcome if failed and last is not None else "",
+        "again": before[-1] if before else "",
         "countdown_s": 1.0 if person.consent.fast else study.trials.countdown_s,
         "least_s": 0.0,
         "free_s": study.training.free_s,
