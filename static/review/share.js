@@ -5,7 +5,7 @@ import { ask, trialPath } from "./api.js";
 
 const FILM_FPS = 30;
 const FILM_BITS = 6_000_000;
-const FRAME_MS = 1500;
+const LAST_FRAME_MS = 400;
 
 export function createShare(page) {
   const name = (ending) => {
@@ -43,14 +43,14 @@ export function createShare(page) {
     tell("Saved. It plays from disk in any browser.");
   };
 
-  const canvas = () => {
-    const found = page.views.canvas();
+  const view = () => {
+    const found = page.views.picture;
     if (!found) throw new Error("The 3-D view is not there yet.");
     return found;
   };
 
   const picture = async () => {
-    save(await still(canvas(), page), name(`-${page.player.seconds.toFixed(2)}s.png`));
+    save(await still(view()), name(`-${page.player.seconds.toFixed(2)}s.png`));
     tell("Saved the view.");
   };
 
@@ -58,12 +58,14 @@ export function createShare(page) {
   const film = async () => {
     const type = ["video/webm;codecs=vp9", "video/webm;codecs=vp8", "video/webm"].find((kind) => globalThis.MediaRecorder?.isTypeSupported(kind));
     if (!type) throw new Error("This browser cannot record WebM.");
-    const recorder = new MediaRecorder(canvas().captureStream(FILM_FPS), { mimeType: type, videoBitsPerSecond: FILM_BITS });
+    const inside = view();
+    const recorder = new MediaRecorder(inside.canvas.captureStream(FILM_FPS), { mimeType: type, videoBitsPerSecond: FILM_BITS });
     const parts = [];
     recorder.addEventListener("dataavailable", ({ data }) => parts.push(data));
     const stopped = new Promise((resolve) => recorder.addEventListener("stop", resolve, { once: true }));
     recorder.start(500);
     tell("Recording; pause to end.");
+    inside.requestRender?.(); // a picture at rest sends no frame
     page.player.play();
     await new Promise((resolve) => {
       const over = () => {
@@ -73,8 +75,10 @@ export function createShare(page) {
       };
       page.player.addEventListener("played", over);
     });
+    await new Promise((resolve) => setTimeout(resolve, LAST_FRAME_MS));
     recorder.stop();
     await stopped;
+    if (!parts.some(({ size }) => size > 0)) throw new Error("The view drew no frame to record.");
     save(new Blob(parts, { type: "video/webm" }), name(".webm"));
     tell("Saved the film.");
   };
@@ -101,22 +105,10 @@ export function createShare(page) {
   page.pops.add("share-open", "share");
 }
 
-/** What a WebGL canvas shows: its buffer is empty outside a frame, a stream of it is not. */
-async function still(canvas, page) {
-  const video = document.createElement("video");
-  video.muted = true;
-  video.srcObject = canvas.captureStream();
-  const shown = new Promise((resolve, reject) => {
-    video.requestVideoFrameCallback(resolve);
-    setTimeout(() => reject(new Error("The view drew nothing to take a picture of.")), FRAME_MS * 4);
-  });
-  await video.play();
-  page.socket.seek(page.player.step); // a canvas at rest sends no frame
-  await shown;
-  const copy = document.createElement("canvas");
-  copy.width = video.videoWidth;
-  copy.height = video.videoHeight;
-  copy.getContext("2d").drawImage(video, 0, 0);
-  for (const track of /** @type {MediaStream} */ (video.srcObject).getTracks()) track.stop();
-  return new Promise((resolve, reject) => copy.toBlob((blob) => (blob ? resolve(blob) : reject(new Error("The picture could not be encoded."))), "image/png"));
+/** What the view shows: drawn once more, because a WebGL canvas is empty outside of a frame. */
+function still({ canvas, scene }) {
+  const state = scene?.__r3f?.root?.getState?.();
+  if (!state?.gl) throw new Error("This version of the viewer gives no picture; use the browser's own screenshot.");
+  state.gl.render(state.scene, state.camera);
+  return new Promise((resolve, reject) => canvas.toBlob((blob) => (blob ? resolve(blob) : reject(new Error("The picture could not be encoded."))), "image/png"));
 }

@@ -100,8 +100,9 @@ export class Views {
     this.socket.seek(step, view);
   }
 
-  /** The canvas of the first view, once it is there. */
-  canvas() {
-    return /** @type {HTMLCanvasElement|null} */ (this.panes[0]?.frame.contentDocument?.querySelector("canvas") ?? null);
+  /** viser's insides of the first view, once it draws: canvas, scene, requestRender. */
+  get picture() {
+    const inside = /** @type {any} */ (this.panes[0]?.frame.contentWindow)?.__viserMutable;
+    return inside?.canvas?.width > 0 ? inside : null;
   }
 }
