@@ -82,10 +82,16 @@ def _run_options(parser: Arguments) -> None:
 
 
 def _run(args: argparse.Namespace) -> None:
+    from app.core import preset
+    from app.robot import load_scene
     from app.web.config import ServerConfig
     from app.web.run import serve
 
-    serve(ServerConfig.from_arguments(args))
+    config = ServerConfig.from_arguments(args)
+    # What every session would refuse is refused once, before the page is there.
+    preset(args.preset, method=args.method)
+    load_scene(args.scene)
+    serve(config)
 
 
 def _sessions_options(parser: Arguments) -> None:
