@@ -23,7 +23,7 @@ from app.review.jobs import Job, Jobs
 from app.review.notes import read_notes, save_notes
 from app.review.opening import present
 from app.review.packing import MEDIA_TYPE
-from app.review.signals import Signals
+from app.review.signals import COLUMNS, Signals
 from app.review.wishes import ShareWish, WhatIfWish
 
 MAX_BODY_BYTES = 64 * 1024
@@ -140,7 +140,7 @@ class Api:
             entry = look_up(path)
             if entry.problem:
                 raise RecordingError(entry.problem)
-            log = load_cache(path)
+            log = load_cache(path, COLUMNS)
             if log is None:
                 return None
             known = present(log, trial_id)

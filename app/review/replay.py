@@ -24,7 +24,7 @@ class Replay:
     """
 
     def __init__(self, log: TrialLog) -> None:
-        """Take a trial with all its columns.
+        """Take a trial; what asks for a column that was not loaded raises KeyError.
 
         Raises:
             ReviewError: If it has no steps.

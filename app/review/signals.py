@@ -9,6 +9,13 @@ from app.core.types import Array
 from app.review.packing import pack, window
 from app.review.replay import Replay
 
+COLUMNS = (
+    *("step", "phase", "settings_id", "input_norm", "belief", "values", "q_values"),
+    *("direct_twist", "assistance_twist", "known_goal_assistance_twist", "best_targets"),
+    *("hand_position_m", "object_poses", "lateness_s", "round_trip_ms"),
+)
+"""The fields that curves and marks are made of: half of a record, which a long trial notices."""
+
 AXES = ("x, away", "y, left", "z, up", "about x", "about y", "about z")
 """Dimensions of a twist in the world frame, as an operator would name them."""
 

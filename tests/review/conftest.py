@@ -133,9 +133,9 @@ class Review:
         """The list, by id."""
         return {row["id"]: row for row in self.http.get("/api/review/trials").json()["trials"]}
 
-    def done(self, answer: httpx.Response) -> httpx.Response:
+    def done(self, answer: httpx.Response, patience_s: float = PATIENCE_S) -> httpx.Response:
         """The answer once its computation is finished."""
-        deadline = time.monotonic() + PATIENCE_S
+        deadline = time.monotonic() + patience_s
         while answer.status_code == 202:
             assert time.monotonic() < deadline
             time.sleep(0.05)

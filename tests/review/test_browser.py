@@ -1,3 +1,4 @@
+# pyright: reportAttributeAccessIssue=false
 """The review as a person uses it: replay, scrub, what-if, compare, share, in a real browser."""
 
 import json

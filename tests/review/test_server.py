@@ -5,13 +5,17 @@ import shutil
 from pathlib import Path
 
 import httpx
+import msgspec
 import numpy as np
 import pytest
 
 from app.recording.cache import cache_path
+from app.recording.container import TrialEncoder
+from app.recording.entry import index_of
+from app.recording.log_file import iter_steps
 from app.recording.reader import read_trial
 from app.review.notes import notes_path
-from app.review.packing import unpack
+from app.review.packing import MAX_POINTS, unpack
 from app.review.secret import Password, write_password
 from tests.review.conftest import Logs, Review, StartReview, write_broken
 
@@ -163,6 +167,42 @@ def test_a_missing_cache_is_made(copied: Logs, review_of: StartReview):
     made = review.done(first)
     assert made.status_code == 200 and cache.is_file()
     assert review.http.get(url).content == made.content
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1500)
+def test_a_two_hour_log_opens_thinned_and_leaves_the_rest(copied: Logs, review_of: StartReview):
+    """720 000 steps: listed like any other, opened with its cache made, its end in sight."""
+    source = copied.path(copied.block)
+    log, steps = read_trial(source), list(iter_steps(source))
+    assert log.summary is not None
+    running = [step for step in steps if step.phase == "running"][40]
+    tail = msgspec.json.encode(running).split(b",", 1)[1]
+    n_steps = 720_000
+    long = source.with_name("trial-041.mcap")
+    encoder = TrialEncoder()
+    encoder.add("trial", log.header, 0, 0)
+    with long.open("wb") as file:
+        for number in range(n_steps):
+            encoder.add("step", b'{"step":%d,' % number + tail, number, number)
+            if number % 20_000 == 0:
+                file.write(encoder.buffer.waiting)
+                encoder.buffer.drop(len(encoder.buffer.waiting))
+        summary = msgspec.structs.replace(log.summary, steps=n_steps, duration_s=7200.0)
+        encoder.add("summary", summary, n_steps, 0)
+        encoder.finish(index_of(log.header, summary))
+        file.write(encoder.buffer.waiting)
+    review = review_of(copied.root)
+    trial_id = copied.block.replace("trial-002", "trial-041")
+    rows = review.trials()
+    assert rows[trial_id]["problem"] == "" and rows[trial_id]["steps"] == n_steps
+    assert rows[copied.glass]["problem"] == ""
+    first = review.http.get(f"/api/review/trial/{trial_id}/signals")
+    opened = review.done(first, patience_s=1200.0)
+    meta, arrays = unpack(opened.content)
+    assert meta["n_steps"] == n_steps and meta["n"] <= MAX_POINTS + 1
+    assert arrays["seconds"][-1] == pytest.approx(7200.0, abs=0.1)
+    assert review.http.get(f"/api/review/trial/{copied.glass}/signals").status_code == 200
 
 
 def test_notes_live_beside_the_log(copied: Logs, review_of: StartReview):
