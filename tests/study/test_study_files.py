@@ -4,10 +4,13 @@ from pathlib import Path
 
 import pytest
 
+from app.robot.scene_file import load_scene
+from app.robot.targets import grasp_targets
 from app.study.check import check
 from app.study.errors import AnswerError, StudyError
 from app.study.items import check_answers, ineligible, survey_items
 from app.study.load import HERE, list_studies, list_surveys, load_study
+from app.study.server.spec import free_scene
 from app.study.sheet import run_sheet
 from tests.study.builders import BACKGROUND, paper, survey_answers
 
@@ -104,3 +107,10 @@ def test_screening_names_the_answer():
     items = {item.id: item for item in paper().background}
     assert ineligible(items, BACKGROUND) == ""
     assert ineligible(items, {**BACKGROUND, "prior_exposure": "yes"}) == "prior_exposure is yes"
+
+
+def test_the_table_for_free_practice_is_a_scene_that_loads():
+    """Its one object can be grasped, as every scene demands, and stands away from the hand."""
+    scene = load_scene(free_scene())
+    assert grasp_targets(scene)
+    assert [abs(place.y_m) > 0.5 for place in scene.places] == [True]
