@@ -35,7 +35,7 @@ MESH_ROBOT = """
     <material name="printed" texture="stripes"/>
   </asset>
   <worldbody>
-    <body name="root">
+    <body name="stem">
       <geom type="mesh" mesh="wedge" rgba=".2 .4 .6 1"/>
       <body name="tip" pos="0 0 .2">
         <joint name="turn" type="hinge" axis="0 1 0"/>
@@ -131,14 +131,14 @@ def test_a_robot_of_meshes_draws(server: viser.ViserServer, node: Find, records:
             best_targets=[0],
         )
     )
-    root, tip = node("/hindsight/arm/root/mesh").glb_data, node("/hindsight/arm/root/tip/mesh")
-    assert materials_of(root)[0]["pbrMetallicRoughness"]["baseColorFactor"] == pytest.approx(
+    stem, tip = node("/hindsight/arm/stem/mesh").glb_data, node("/hindsight/arm/stem/tip/mesh")
+    assert materials_of(stem)[0]["pbrMetallicRoughness"]["baseColorFactor"] == pytest.approx(
         [*linear("#336699"), 1.0], abs=1e-6
     )
     look = materials_of(tip.glb_data)
     assert len(look) == 1  # the collision sphere of group 3 is not drawn
     assert "baseColorTexture" in look[0]["pbrMetallicRoughness"]
-    jaw = node("/hindsight/arm/root/tip/jaw").position
+    jaw = node("/hindsight/arm/stem/tip/jaw").position
     assert jaw == pytest.approx([0.0, 0.03, 0.1], abs=1e-4)
     viewer.close()
 
