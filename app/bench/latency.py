@@ -7,6 +7,7 @@ the same atomic block as the arm's poses; the page looks at it in each animation
 import subprocess
 import sys
 import tempfile
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -72,13 +73,11 @@ async (moves) => {
 def bench_latency() -> dict[str, dict[str, Any]]:
     """{"latency": {median, p99, unit}} [ms]; empty, with a reason, where no browser is found."""
     browser = find_browser()
-    try:
-        from playwright.sync_api import sync_playwright
-    except ImportError:
-        browser = None
-    if browser is None:
+    if browser is None or find_spec("playwright") is None:
         print("latency: left out, no Chromium or no playwright here", file=sys.stderr)
         return {}
+    from playwright.sync_api import sync_playwright
+
     with tempfile.TemporaryDirectory() as folder:
         server = subprocess.Popen(
             [sys.executable, "-u", "-m", "app", "run", "--port", "0", "--sessions", folder],

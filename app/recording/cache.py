@@ -119,7 +119,7 @@ def load_cache(log: Path, columns: Sequence[str] | None = None) -> TrialLog | No
             # The step's number comes along: it tells how many rows there are.
             stored_names = {n for n in names if n in file.schema_arrow.names} | {"step"}
             table = file.read(list(stored_names))
-    except (OSError, pa.ArrowException, msgspec.MsgspecError):
+    except (OSError, pa.ArrowException, ValueError, RecursionError):
         return None
     return TrialLog(
         path=log,

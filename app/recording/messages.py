@@ -52,11 +52,11 @@ def decode(kind: type[Struct], data: bytes) -> Struct:
         # evidence, so it stays readable.
         if b"null" not in data:
             raise MessageError(f"bad {kind.__name__} message: {error}") from None
-    except msgspec.DecodeError as error:
+    except (ValueError, RecursionError) as error:
         raise MessageError(f"bad {kind.__name__} message: {error}") from None
     try:
         return msgspec.convert(_nulls_to_nan(msgspec.json.decode(data)), kind)
-    except msgspec.ValidationError as error:
+    except ValueError as error:
         raise MessageError(f"bad {kind.__name__} message: {error}") from None
 
 

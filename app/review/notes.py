@@ -52,7 +52,7 @@ def read_notes(log: Path) -> Notes:
         return Notes()
     except OSError as error:
         raise ReviewError(f"cannot read {path}: {error.strerror}") from None
-    except msgspec.MsgspecError as error:
+    except (ValueError, RecursionError) as error:
         raise ReviewError(f"{path} is damaged: {error}") from None
 
 
@@ -72,7 +72,7 @@ def save_notes(log: Path, body: bytes) -> Notes:
     """
     try:
         wanted = msgspec.json.decode(body, type=Notes)
-    except msgspec.MsgspecError as error:
+    except (ValueError, RecursionError) as error:
         raise ReviewError(f"these are no notes: {error}") from None
     if max(map(len, [wanted.text, *(m.text for m in wanted.moments)])) > MAX_TEXT:
         raise ReviewError(f"a note is longer than {MAX_TEXT} characters")

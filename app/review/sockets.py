@@ -138,7 +138,7 @@ class ReviewSockets:
                 return
             try:
                 message = _decoder.decode(frame.get("text") or "")
-            except msgspec.MsgspecError as error:
+            except (ValueError, RecursionError) as error:
                 text = f"this is no message of the review: {error}"
                 client.outbox.put(to_json({"type": "error", "text": text}))
                 continue

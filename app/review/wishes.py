@@ -70,5 +70,5 @@ class ShareWish(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
 def _decode(body: bytes, kind: type[T]) -> T:
     try:
         return msgspec.json.decode(body, type=kind)
-    except msgspec.MsgspecError as error:
+    except (ValueError, RecursionError) as error:
         raise ReviewError(f"this cannot be computed: {error}") from None

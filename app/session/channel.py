@@ -107,7 +107,7 @@ class Channel:
     def _dispatch(self, decoder: "msgspec.json.Decoder[dict[str, Any]]", line: bytes) -> None:
         try:
             message = decoder.decode(line)
-        except (msgspec.DecodeError, RecursionError):
+        except (ValueError, RecursionError):
             self.malformed += 1
             return
         self._on_message(message)

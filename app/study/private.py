@@ -56,7 +56,7 @@ class PrivateFolder:
             return msgspec.json.decode((self.path / f"{participant}.json").read_bytes())
         except FileNotFoundError:
             return {}
-        except (OSError, msgspec.MsgspecError) as error:
+        except (OSError, ValueError, RecursionError) as error:
             raise StorageError(f"private file of {participant}: {error}") from None
 
     def update(self, participant: str, changes: dict[str, Any]) -> None:

@@ -115,7 +115,7 @@ class Channel:
                 return
             try:
                 head, text = decoder.decode(line), line[:-1].decode()
-            except (msgspec.DecodeError, UnicodeDecodeError) as error:
+            except (ValueError, RecursionError) as error:
                 self.malformed += 1
                 logger.warning("a worker sent %d bytes that are no message: %s", len(line), error)
                 continue

@@ -60,7 +60,7 @@ def filter_frame(frame: bytes) -> bytes:
         raise FrameError(f"frame of {len(frame)} bytes; valid: at most {MAX_FRAME_BYTES}")
     try:
         camera = _decoder.decode(frame)
-    except (msgspec.DecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:
         raise FrameError(f"{_type_of(frame)} is not let through: {error}") from None
     numbers = [*camera.wxyz, *camera.position, *camera.look_at, *camera.up_direction]
     if not all(map(math.isfinite, [*numbers, camera.fov, camera.near, camera.far])):
@@ -71,5 +71,5 @@ def filter_frame(frame: bytes) -> bytes:
 def _type_of(frame: bytes) -> str:
     try:
         return repr(_head_decoder.decode(frame).type[:64])
-    except (msgspec.DecodeError, RecursionError):
+    except (ValueError, RecursionError):
         return "a frame without a type"

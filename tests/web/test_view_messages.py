@@ -70,6 +70,12 @@ def test_a_bad_camera_is_refused(changes: dict[str, Any]):
         filter_frame(pack(**changes))
 
 
+def test_a_frame_that_is_not_utf8_is_refused():
+    """Torn text is no camera."""
+    with pytest.raises(FrameError, match="ViewerCameraMessage"):
+        filter_frame(pack().replace(b"image_width", b"image_widt\xcd"))
+
+
 def test_an_oversized_frame_is_refused_by_its_size():
     """The message names the size and the limit."""
     with pytest.raises(FrameError, match=f"{MAX_FRAME_BYTES + 1} bytes.*{MAX_FRAME_BYTES}"):
