@@ -13,8 +13,7 @@ const FIRST = { user: true, assist: true, ghosts: true, tags: true, path: true, 
 export function createLayers(page) {
   const layers = { ...FIRST, .../** @type {object} */ (recall("review.layers", {})) };
   layers.slice_of = "belief"; // a goal's name belongs to its scene
-  const weak = new URLSearchParams(location.search).get("shadows") === "0";
-  let detail = weak || recall("review.detail", "full") === "plain" ? "plain" : "full";
+  let detail = recall("review.detail", "full") === "plain" ? "plain" : "full";
   let camera = 0;
   const panel = byId("layers");
 

@@ -8,14 +8,14 @@ import { describe } from "./words.js";
 
 /** One frame with its chip and tags. */
 class Pane {
-  constructor(session, index, plain) {
+  constructor(session, index) {
     this.index = index;
     this.frame = /** @type {HTMLIFrameElement} */ (h("iframe", { class: "viewer", title: `3-D view ${index + 1}`, tabindex: -1, dataset: { testid: index ? `viewer-${index}` : "viewer" } }));
     this.tags = h("div", { class: "tags", "aria-hidden": "true" });
     this.chip = h("div", { class: "chip-card panel" });
     this.element = h("div", { class: "pane" }, this.frame, this.tags, this.chip);
     this.viewer = new Viewer(this.frame);
-    this.source = `/review/view/${session}/${index}?hideViserLogo${plain}`;
+    this.source = `/review/view/${session}/${index}`;
     /** @type {null|{meta: any, arrays: Record<string, Float32Array>}} */
     this.trial = null;
     /** @type {Map<string, {element: HTMLElement, number: HTMLElement}>} */
@@ -24,7 +24,7 @@ class Pane {
   }
 
   load() {
-    if (!this.frame.src) this.frame.src = this.source;
+    this.viewer.open(this.source);
   }
 
   show(trial) {
@@ -57,8 +57,6 @@ export class Views {
   constructor(socket, session) {
     this.socket = socket;
     this.session = session;
-    const query = new URLSearchParams(location.search);
-    this.plain = ["antialias", "shadows"].filter((name) => query.get(name) === "0").map((name) => `&${name}=0`).join("");
     /** @type {Pane[]} */
     this.panes = [];
     /** @type {string[]} ids of the trials shown */
@@ -75,7 +73,7 @@ export class Views {
   async open(trials) {
     this.wanted = trials.map(({ meta }) => meta.id);
     while (this.panes.length < trials.length) {
-      const pane = new Pane(this.session, this.panes.length, this.plain);
+      const pane = new Pane(this.session, this.panes.length);
       this.panes.push(pane);
       byId("views").append(pane.element);
     }

@@ -26,7 +26,7 @@ pytestmark = [pytest.mark.browser, pytest.mark.timeout(600)]
 
 WAIT_MS = 90_000
 """Only ends a test that would hang: software GL on a busy machine is slow."""
-PLAIN = "?antialias=0&shadows=0"
+PLAIN = "?detail=plain"
 DRAWS = """() => {
   const view = document.querySelector('[data-testid=viewer]').contentWindow.__viserMutable;
   return view?.canvas?.width > 0;
