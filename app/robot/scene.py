@@ -32,7 +32,7 @@ class Table(Strict):
     """The table's top, z = 0, in the world frame; the robot's base stands on it."""
 
     x_min_m: Annotated[float, Field(ge=-1.0, le=-0.08)] = -0.15
-    x_max_m: Annotated[float, Field(ge=0.4, le=1.5)] = 0.90
+    x_max_m: Annotated[float, Field(ge=0.4, le=1.5)] = 1.05
     y_min_m: Annotated[float, Field(ge=-1.5, le=-0.2)] = -0.60
     y_max_m: Annotated[float, Field(ge=0.2, le=1.5)] = 0.60
 

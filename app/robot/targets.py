@@ -103,7 +103,7 @@ def _object_grasps(scene: Scene, check: ReachabilityCheck, index: int) -> Array:
         if not alive.any():
             raise GraspError(
                 f"scene {scene.name!r}: the arm cannot grasp {scene.objects[index].name!r} at place"
-                f" {place.name!r} as at the places before it; valid: places 0.35 to 0.75 m in front"
+                f" {place.name!r} as at the places before it; valid: places 0.35 to 0.90 m in front"
                 " of the base, clear of each other by a hand's width"
             )
     return every[_spread(every, twins, np.flatnonzero(alive), turn)]

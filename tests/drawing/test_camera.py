@@ -34,7 +34,7 @@ def test_all_places_for_objects_are_in_sight(preset: str, aspect: float) -> None
     right /= np.linalg.norm(right)
     up = np.cross(right, forward)
     half = np.tan(np.radians(view.fov_degrees) / 2)
-    for x, y in ((0.66, 0.22), (0.70, 0.0), (0.66, -0.22), (0.0, 0.0)):
+    for x, y in ((0.82, 0.22), (0.85, 0.0), (0.82, -0.22), (0.0, 0.0)):
         ray = np.array([x, y, 0.1]) - eye
         depth = ray @ forward
         assert abs(ray @ up) < depth * half

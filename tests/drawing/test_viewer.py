@@ -268,7 +268,7 @@ def test_the_slice_is_drawn_beside_the_loop(
         viewer._slice._end.wait(0.02)
     low, high = viewer.value_range or (0.0, 0.0)
     assert low < high
-    assert node("/hindsight/slice").position == pytest.approx([0.45, 0.0, 0.004])
+    assert node("/hindsight/slice").position == pytest.approx([0.525, 0.0, 0.004])
     viewer.set_layers({"slice": False})
     assert viewer.value_range is None
     assert not node("/hindsight/slice").visible

@@ -21,8 +21,9 @@ def _scripted_ctrl(sim: Simulation, ticks: int) -> list[Array]:
     time = 0.01 * np.arange(ticks)
     sweep = np.zeros((ticks, 8))
     sweep[:, 0] = 0.5 * np.sin(2.0 * time)
-    sweep[:, 1] = 0.35 * np.minimum(time, 1.0)
-    sweep[:, 3] = -0.5 * np.minimum(time, 1.0)
+    sweep[:, 1] = 0.45 * np.minimum(time, 1.0)
+    sweep[:, 3] = -0.99 * np.minimum(time, 1.0)
+    sweep[:, 5] = 0.53 * np.minimum(time, 1.0)
     sweep[:, 7] = 0.05 * (time > 1.0)
     return list(start + sweep)
 
@@ -174,7 +175,7 @@ def test_the_table_is_the_drawn_one(scene: Scene) -> None:
     """1.05 × 1.2 m from x = −0.15, its top at z = 0: the base stands on it."""
     geom = Simulation(scene).model.geom("table")
     assert np.allclose(geom.pos - geom.size, [-0.15, -0.6, -0.04])
-    assert np.allclose(geom.pos + geom.size, [0.90, 0.6, 0.0])
+    assert np.allclose(geom.pos + geom.size, [1.05, 0.6, 0.0])
 
 
 def test_bad_values_are_refused_by_name(scene: Scene) -> None:

@@ -21,7 +21,7 @@ LEVEL = (1.0, 0.0, 0.0, 0.0)
 class Bounds:
     """The table's top in the world frame [m]."""
 
-    x: tuple[float, float] = (-0.15, 0.9)
+    x: tuple[float, float] = (-0.15, 1.05)
     y: tuple[float, float] = (-0.6, 0.6)
 
 
