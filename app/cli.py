@@ -68,6 +68,11 @@ def _run_options(parser: Arguments) -> None:
         "--hold-on-loss", action="store_true", help="stop the arm while the person's input is lost"
     )
     parser.add_argument(
+        "--attract",
+        action="store_true",
+        help="let simulated users drive until a visitor touches a stick, and again a minute after",
+    )
+    parser.add_argument(
         "--capacity",
         type=int,
         metavar="N",
@@ -110,10 +115,10 @@ def _bench_options(parser: Arguments) -> None:
     parser.add_argument(
         "what",
         nargs="?",
-        choices=("all", "assist", "simulate", "capacity", "soak"),
+        choices=("all", "assist", "simulate", "review", "capacity", "soak"),
         default="all",
-        help="all: loop, recording, view, latency; capacity: sessions this machine bears; "
-        "soak: sessions that run for long",
+        help="all: loop, recording, view, latency; review: opening and scrubbing a long trial; "
+        "capacity: sessions this machine bears; soak: sessions that run for long",
     )
     parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
     parser.add_argument(
@@ -126,7 +131,9 @@ def _bench_options(parser: Arguments) -> None:
     parser.add_argument(
         "--seconds", type=_positive, default=15.0, help="capacity: how long each number is tried"
     )
-    parser.add_argument("--minutes", type=_positive, default=60.0, help="soak: how long")
+    parser.add_argument(
+        "--minutes", type=_positive, help="soak: how long (60); review: length of the trial (10)"
+    )
     parser.add_argument(
         "--keep", action="store_true", help="capacity: let servers here offer what was measured"
     )

@@ -3,10 +3,12 @@
 import { byId, h, icon, setHidden, setIcon, setText } from "./dom.js";
 import { inWords } from "./objects.js";
 import { seconds } from "./trial.js";
+import { describeLostInput, describeLostLine } from "./unattended.js";
 
 const ICONS = { ok: "check", warn: "warn", bad: "cross", info: "info" };
 const NOTICE_STAYS = { info: 4000, warn: 8000, error: 10_000 }; // [ms]
 const MOST_NOTICES = 3;
+const LOSS_SHOWN_AFTER = 700; // shorter ones pass with a click or a slow frame [ms]
 
 /** Words for an outcome and how bad it is. */
 export function describeOutcome({ outcome, target, grasped }) {
@@ -33,8 +35,11 @@ export function createBanners(store, act) {
   const outcome = createBanner("outcome", "New trial", "new", act.newTrial);
   const lost = createBanner("lost", "Try now", null, () => (store.state.connection.state === "lost" ? location.reload() : act.retry()));
   const watching = createBanner("watching", null, null, null);
+  const simulated = createBanner("simulated", null, null, null);
+  const unheard = createBanner("unheard", null, null, null);
+  let heardAt = performance.now();
   const notices = h("div", { class: "notices", role: "log", "aria-label": "Messages" });
-  byId("banners").append(lost.element, outcome.element, watching.element, notices);
+  byId("banners").append(lost.element, outcome.element, watching.element, simulated.element, unheard.element, notices);
   /** @type {Map<number, HTMLElement>} */
   const shown = new Map();
 
@@ -71,20 +76,28 @@ export function createBanners(store, act) {
         setHidden(outcome.button, hello?.control === false);
       }
       setHidden(lost.element, !down || (connection.state === "reconnecting" && !connection.before));
-      if (down) lost.show(...describeLoss(connection));
+      if (down) lost.show(...describeLoss(store.state));
       setText(lost.button, connection.state === "lost" ? "Start again" : "Try now");
+      const driven = trial?.simulated === true;
       setHidden(watching.element, hello?.control !== false || down || over);
-      watching.show("info", "You are watching", "Someone else is steering.");
+      watching.show("info", "You are watching", driven ? "A simulated user is driving." : "Someone else is steering.");
+      setHidden(simulated.element, !driven || hello?.control !== true || down || over);
+      simulated.show("info", "A simulated user is driving", "Touch a stick to take over.");
+      const loss = down ? null : describeLostInput(store.state);
+      if (!loss) heardAt = performance.now();
+      setHidden(unheard.element, !loss || performance.now() - heardAt < LOSS_SHOWN_AFTER);
+      if (loss) unheard.show("warn", ...loss);
       renderNotices();
     },
   };
 }
 
-function describeLoss({ state, retryAt, reason }) {
+function describeLoss(page) {
+  const { state, retryAt, reason } = page.connection;
   if (state === "lost") return ["bad", "This session has ended", reason || "The robot is no longer there."];
   const wait = retryAt === null ? 0 : Math.max(0, Math.ceil((retryAt - performance.now()) / 1000));
   const when = wait > 0 ? `Trying again in ${wait} s.` : "Trying again now.";
-  return ["warn", "Connection lost. The robot has stopped.", `${when} This trial will continue.`];
+  return ["warn", describeLostLine(page), `${when} This trial will continue.`];
 }
 
 function createBanner(id, action, actionIcon, act) {

@@ -16,7 +16,7 @@ export function createCoach(store) {
         remember("coached", true);
         store.update({ coach: false });
       }
-      const shown = store.state.coach && connection.state === "connected" && hello?.control === true && status?.trial.outcome === "running";
+      const shown = store.state.coach && connection.state === "connected" && hello?.control === true && status?.trial.outcome === "running" && !status.trial.simulated;
       setHidden(coach, !shown);
       document.body.classList.toggle("pulse", shown);
       const target = status?.trial.target;

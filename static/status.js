@@ -20,7 +20,7 @@ export function createStatus(store) {
       const connected = connection.state === "connected";
       setAttribute(device, "data-device", current.kind);
       setIcon(device.firstElementChild, ICONS[current.kind]);
-      setText(device.lastElementChild, hello?.control === false ? "Watching" : current.name);
+      setText(device.lastElementChild, hello?.control === false ? "Watching" : status?.trial.simulated ? "Simulated user" : current.name);
       setAttribute(device, "aria-label", `Input: ${current.name}. Set up devices`);
 
       setAttribute(link, "data-state", connection.state);

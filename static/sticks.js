@@ -34,16 +34,26 @@ export function createSticks(store, input) {
   push();
   return {
     render() {
-      const { axes, mode, status, connection, hello } = store.state;
+      const { axes, mode, status, connection, hello, yaw } = store.state;
       const live = connection.state === "connected" && hello?.control === true;
       const still = !live || (status && status.trial.outcome !== "running");
+      const simulated = live && status?.trial.simulated ? status.sticks : undefined;
+      const turn = simulated ? simulated.yaw - yaw : 0;
       for (const stick of sticks) {
-        const value = stick.side === "left" ? axes.slice(0, 2) : axes.slice(2);
+        const own = stick.side === "left" ? axes.slice(0, 2) : axes.slice(2);
+        const value = simulated ? simulated[stick.side] : own;
         const assist = still ? [0, 0] : (status?.assist_stick?.[stick.side] ?? [0, 0]);
-        stick.render(mode, live ? value : [0, 0], assist);
+        const seen = (vector) => (stick.side === "right" ? turned(vector, turn) : vector);
+        stick.render(simulated?.mode ?? mode, live ? seen(value) : [0, 0], seen(assist));
       }
     },
   };
+}
+
+/** A stick's vector that was pushed in a view of another heading, as it is in this one. */
+function turned([x, y], angle) {
+  const [cos, sin] = [Math.cos(angle), Math.sin(angle)];
+  return [x * cos - y * sin, x * sin + y * cos];
 }
 
 class Stick {

@@ -33,6 +33,7 @@
  * @property {Layers} layers
  * @property {string[]} [scenes]
  * @property {boolean} [recorded]
+ * @property {boolean} [hold_on_loss]   lost input stops the arm
  * @property {string|null} [watch]      a read-only link
  *
  * @typedef {Record<string, boolean|string>} Layers
@@ -49,6 +50,7 @@
  * @property {string} grasped           the object held, or empty
  * @property {string} scene
  * @property {number} seed
+ * @property {boolean} [simulated]      a simulated user steers
  *
  * @typedef {object} Status             30 a second
  * @property {"status"} type
@@ -57,6 +59,8 @@
  * @property {Vec3} [hand]              world frame [m]
  * @property {Record<string, Vec3>} [objects]   world frame [m]
  * @property {{left: Vec2, right: Vec2}} [assist_stick]  what assistance adds, full stick = 1
+ * @property {{left: Vec2, right: Vec2, mode: Mode, yaw: number}} [sticks]  what is pushed, by whom ever
+ * @property {""|"nobody"|"silent"|"blur"|"hidden"|"disconnected"} [loss]   why there is no input
  * @property {{hz: number, late: number, lateness_ms: number}} [loop]
  * @property {Record<string, unknown>} [settings]
  * @property {Layers} [layers]

@@ -23,6 +23,7 @@ class TrialView:
         object_names: In the order of the record's object_poses.
         object_heights_m: Of each object, standing [m].
         settings: All settings by name.
+        simulated: Whether a simulated user steers now.
     """
 
     number: int
@@ -34,6 +35,7 @@ class TrialView:
     object_names: tuple[str, ...]
     object_heights_m: tuple[float, ...]
     settings: Mapping[str, Any]
+    simulated: bool = False
 
 
 class Frame(NamedTuple):
@@ -49,3 +51,5 @@ class Frame(NamedTuple):
     outcome: str
     grasped: str
     health: Health
+    loss: str = ""
+    """Why there is no input, of `watchdog.Loss`; empty: there is."""

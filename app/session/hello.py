@@ -28,6 +28,7 @@ def hello_message(
     layers: Mapping[str, Any],
     *,
     recorded: bool,
+    hold_on_loss: bool,
     watch: str | None,
     hide: Sequence[str],
 ) -> dict[str, Any]:
@@ -40,6 +41,7 @@ def hello_message(
         method: Its method.
         layers: The drawn layers.
         recorded: Whether trials are recorded.
+        hold_on_loss: Whether lost input stops the arm.
         watch: Path of the read-only link.
         hide: What must not reach the browser.
     """
@@ -57,6 +59,7 @@ def hello_message(
         "settings": dict(view.settings),
         "layers": dict(layers),
         "recorded": recorded,
+        "hold_on_loss": hold_on_loss,
         "watch": watch,
         "view": f"/view/{session}/",
         "control": False,
@@ -67,6 +70,7 @@ def hello_message(
             "shown_as": view.shown_as,
             "scene": view.scene,
             "seed": view.seed,
+            "simulated": view.simulated,
             "phase": "ready",
             "outcome": "running",
             "seconds": 0.0,

@@ -5,12 +5,13 @@ import time
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from app.core import AssistanceSettings, settings_to_dict
+from app.core import AssistanceSettings, UserInput, settings_to_dict
 from app.errors import AppError
 from app.robot.objects import object_height
 from app.robot.scene import Scene
 from app.robot.scene_file import list_scenes, load_scene
 from app.session.assistant import change_settings, method_changes
+from app.session.autopilot import Autopilot, Driver
 from app.session.commands import Command, CommandError, parse_command
 from app.session.frame import Frame, TrialView
 from app.session.header import TrialIdentity
@@ -24,6 +25,7 @@ from app.session.spec import SessionOptions, WorkerSpec
 from app.session.stamps import Stamps
 from app.session.trial import Trial
 from app.session.viewing import Viewing
+from app.session.watchdog import Loss
 
 Say = Callable[[dict[str, Any]], None]
 SERVER = "server"
@@ -51,6 +53,7 @@ class Session:
         inbox: Inbox,
         recorder: Recorder,
         say: Say,
+        driver: Driver | None = None,
     ) -> None:
         """Set up the first trial.
 
@@ -62,13 +65,15 @@ class Session:
             inbox: Where input and commands arrive.
             recorder: Where records go.
             say: Sends a message that must arrive.
+            driver: Steers while no visitor does; None: nobody does.
 
         Raises:
             AppError: If a target, method or setting is not valid.
         """
         self._spec, self._options = spec, options
         self._inbox, self._recorder, self._say = inbox, recorder, say
-        self._first_scene = scene
+        self._first_scene, self._first_settings = scene, settings
+        self._autopilot = None if driver is None else Autopilot(driver)
         self._preset = str(spec.settings.get("preset", "default"))
         seed = random.SystemRandom().randrange(2**31) if options.seed is None else options.seed
         self._seed = seed
@@ -127,6 +132,8 @@ class Session:
         for message in self._inbox.take():
             self._handle(message)
         user_input, loss = self._inbox.gate.current(beat.at_s)
+        if self._autopilot is not None:
+            user_input, loss = self._let_drive(self._autopilot, user_input, loss, beat.at_s)
         stamps = Stamps(
             monotonic_s=beat.at_s,
             wall_s=time.time(),
@@ -149,6 +156,7 @@ class Session:
             outcome=trial.outcome,
             grasped=trial.grasped_object,
             health=self._health(),
+            loss=loss,
         )
         for offer in self._on_frame:
             offer(frame)
@@ -158,6 +166,28 @@ class Session:
                 self._recorder.finish(trial.summary(stamps.wall_s))
         if trial.tick % PROBLEM_TICKS == 0:
             self._tell_problem()
+
+    def _let_drive(
+        self, autopilot: Autopilot, user_input: UserInput, loss: Loss, now_s: float
+    ) -> tuple[UserInput, Loss]:
+        """The input of the tick, the driver's or the visitor's, and why it is missing."""
+        change = autopilot.watch(user_input, now_s)
+        if change == "handed-over":
+            self._note_handover()
+        elif change == "resumed" or (autopilot.drives and autopilot.driver.wants_next(self.trial)):
+            # The visitor's scene and settings leave with them.
+            name = self._first_scene.name
+            self._new_trial(Command("new-trial", {"scene": name}), self._first_settings)
+        if not autopilot.drives:
+            return user_input, loss
+        user_input, close = autopilot.driver.act(self.trial)
+        if close:
+            self.trial.command(Command("grasp"))
+        return user_input, ""
+
+    def _note_handover(self) -> None:
+        self.trial.note("handover", to="visitor")
+        self._look()
 
     def close(self) -> None:
         """End the trial and its log."""
@@ -199,8 +229,10 @@ class Session:
                     command.name, command.args, lambda error: self._acknowledge(message, error)
                 )
                 return
+            if self._autopilot is not None and command.client != SERVER and self._autopilot.take():
+                self._note_handover()
             if command.name == "new-trial":
-                self._new_trial(command)
+                self._new_trial(command, self.trial.settings)
             else:
                 self.trial.command(command)
         except AppError as error:
@@ -221,14 +253,13 @@ class Session:
 
     # trials
 
-    def _new_trial(self, command: Command) -> None:
+    def _new_trial(self, command: Command, settings: AssistanceSettings) -> None:
         """End this trial and begin another; where the command is not valid, nothing happens."""
         args = command.args
         scene = self._scene_for(args.get("scene"), from_server=command.client == SERVER)
         target = args.get("target")
         if target is not None:
             scene.object_index(target)
-        settings = self.trial.settings
         if "method" in args:
             changes = method_changes(settings, args["method"], self._preset)
             settings = change_settings(settings, changes)
@@ -271,7 +302,7 @@ class Session:
             trial=self._recorder.next_number(),
             attempt=attempt,
             shown_as=self._shown_as,
-            options=dict(options.factors),
+            options={**options.factors, **({"driver": "simulated"} if self._is_driven else {})},
         )
         trial = Trial(
             self._world,
@@ -291,6 +322,10 @@ class Session:
         self._look()
         return trial
 
+    @property
+    def _is_driven(self) -> bool:
+        return self._autopilot is not None and self._autopilot.drives
+
     def _look(self) -> None:
         trial = self.trial
         self._view_settings_id = trial.settings_id
@@ -304,4 +339,5 @@ class Session:
             object_names=self.scene.object_names,
             object_heights_m=tuple(object_height(item) for item in self.scene.objects),
             settings=settings_to_dict(trial.settings),
+            simulated=self._is_driven,
         )

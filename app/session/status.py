@@ -73,6 +73,7 @@ def status_message(
         "grasped": frame.grasped,
         "scene": view.scene,
         "seed": view.seed,
+        "simulated": view.simulated,
     }
     message: Message = {
         "type": "status",
@@ -85,6 +86,13 @@ def status_message(
         "assistance": record.assistance_twist,
         "executed": record.executed_twist,
         "assist_stick": assist_stick(record, view.settings),
+        "sticks": {
+            "left": record.axes[:2],
+            "right": record.axes[2:],
+            "mode": record.mode,
+            "yaw": record.view_yaw_rad,
+        },
+        "loss": frame.loss,
         "loop": {
             "hz": round(health.hz, 1),
             "late": health.late,

@@ -16,6 +16,7 @@ from app.errors import AppError
 from app.recording.errors import RecordingError
 from app.recording.store import append_event, open_session
 from app.robot.scene_file import load_scene
+from app.session.autopilot import Driver
 from app.session.channel import Channel
 from app.session.frame import Frame
 from app.session.header import versions
@@ -40,12 +41,13 @@ half a tick."""
 logger = logging.getLogger("hindsight.session")
 
 
-def main(spec: WorkerSpec, sock: socket.socket) -> None:
+def main(spec: WorkerSpec, sock: socket.socket, driver: Driver | None = None) -> None:
     """Run one session until it is told to end, its socket closes, or SIGTERM comes.
 
     Args:
         spec: What to run.
         sock: This end of the socket pair to the web process.
+        driver: Steers while no visitor does; None: nobody does.
     """
     sys.setswitchinterval(SWITCH_INTERVAL_S)
     pacer = Pacer(CONTROL_DT_S)
@@ -55,7 +57,7 @@ def main(spec: WorkerSpec, sock: socket.socket) -> None:
     reason = "The simulation failed."
     try:
         channel.start()
-        reason = _run(spec, channel, inbox, pacer)
+        reason = _run(spec, channel, inbox, pacer, driver)
     except AppError as error:
         logger.error("session %s: %s", spec.id, error)
         reason = str(error)
@@ -81,7 +83,9 @@ def first_settings(spec: WorkerSpec, options: SessionOptions) -> AssistanceSetti
     return preset(str(spec.settings.get("preset", "default")), **changes)
 
 
-def _run(spec: WorkerSpec, channel: Channel, inbox: Inbox, pacer: Pacer) -> str:
+def _run(
+    spec: WorkerSpec, channel: Channel, inbox: Inbox, pacer: Pacer, driver: Driver | None
+) -> str:
     """Set up and loop; returns why it ended."""
     options = parse_options(spec.options)
     inbox.delay_s = options.input_delay_s
@@ -94,7 +98,7 @@ def _run(spec: WorkerSpec, channel: Channel, inbox: Inbox, pacer: Pacer) -> str:
         folder = open_session(spec.sessions, spec.study, subject, spec.session, about)
         append_event(folder, "worker_start", {"pid": os.getpid()})
     recorder = Recorder(folder)
-    session = Session(spec, options, scene, settings, inbox, recorder, channel.send)
+    session = Session(spec, options, scene, settings, inbox, recorder, channel.send, driver)
     try:
         with view_server() as server:
             _serve(spec, options, session, channel, inbox, pacer, recorder, server)
@@ -141,6 +145,7 @@ def _serve(
             session.trial.settings.method,
             viewing.state.layers,
             recorded=recorder.is_on,
+            hold_on_loss=options.hold_on_loss,
             watch=options.watch,
             hide=options.hide,
         )

@@ -1,8 +1,16 @@
-"""Simulated users at the sticks of the live page, until a visitor takes over."""
+"""Simulated users at the sticks of the live page, until a visitor takes over.
+
+`main` is what a worker of `hindsight run --attract` runs: a session with an `Attract` as driver.
+"""
+
+import random
+import socket
 
 import numpy as np
 
 from app.core import UserInput
+from app.session import worker
+from app.session.spec import WorkerSpec
 from app.session.trial import Trial
 from app.simulate.models import MODELS, Action, Sight, User
 from app.simulate.models.base import DECISION_TICKS, REST
@@ -10,6 +18,18 @@ from app.simulate.population import load_population
 
 REST_AFTER_S = 2.0
 """How long a finished trial stays in the picture before the next one [s]."""
+
+
+def main(spec: WorkerSpec, sock: socket.socket) -> None:
+    """Run one session that simulated users drive until a visitor does.
+
+    Args:
+        spec: What to run; its seed, where it has one, is the users', too.
+        sock: This end of the socket pair to the web process.
+    """
+    seed = spec.options.get("seed")
+    users = random.SystemRandom().randrange(2**31) if seed is None else seed
+    worker.main(spec, sock, Attract(seed=users))
 
 
 class Attract:

@@ -15,6 +15,10 @@ LIVE_TIMEOUT_S = 300.0
 """A live trial ends after this long [s]: time to look around, and an end for a page left open."""
 
 
+ATTRACT_ENTRY = "app.simulate.attract:main"
+"""What a worker runs where simulated users drive until a visitor does."""
+
+
 class ConfigError(AppError):
     """A setting of the server is out of range or unsafe."""
 
@@ -121,7 +125,14 @@ class ServerConfig:
             capacity=capacity,
             retention_days=args.retention_days or 0.0,
             open_browser=args.open,
+            **_ATTRACT if args.attract else {},
         )
+
+
+_ATTRACT: dict[str, Any] = {
+    "worker_entry": ATTRACT_ENTRY,
+    "preload": ("app.session.preload", "app.simulate.attract"),
+}
 
 
 def _require_above_zero(name: str, value: float) -> None:

@@ -44,6 +44,7 @@ HELLO: dict[str, Any] = {
     },
     "scenes": ["default", "clutter", "in_line"],
     "recorded": True,
+    "hold_on_loss": False,
     "watch": "/watch/abc",
     "methods": ["direct", "blend", "policy", "yielding", "autonomy"],
     "settings": {
@@ -83,6 +84,7 @@ TRIAL: dict[str, Any] = {
     "grasped": "",
     "scene": "default",
     "seed": 7,
+    "simulated": False,
 }
 STATUS: dict[str, Any] = {
     "type": "status",
@@ -99,6 +101,8 @@ STATUS: dict[str, Any] = {
     "assistance": [0] * 6,
     "executed": [0] * 6,
     "assist_stick": {"left": [0, 0], "right": [0.4, -0.5]},
+    "sticks": {"left": [0, 0], "right": [0, 0], "mode": "translate", "yaw": 0.0},
+    "loss": "",
     "loop": {"hz": 100.0, "late": 0, "lateness_ms": 0.0},
     "settings": HELLO["settings"],
     "settings_id": 1,

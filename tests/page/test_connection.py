@@ -54,8 +54,8 @@ def test_a_dropped_line_is_shown_and_the_sequence_goes_on(fake: FakeServer, open
     fake.refuse = True
     fake.drop()
     page.wait_for_selector('[data-testid="connection"][data-state="reconnecting"]')
-    page.wait_for_selector("text=Connection lost. The robot has stopped.")
-    assert page.locator("#assertive").inner_text() == "Connection lost. The robot has stopped."
+    page.wait_for_selector("text=Connection lost. Policy goes on by itself.")
+    assert page.locator("#assertive").inner_text() == "Connection lost. Policy goes on by itself."
     assert page.locator(".status .hz").inner_text() == "–"
     assert page.locator(".status .rtt").inner_text() == "–"
     last = max(m["seq"] for m in fake.of_type("input"))
@@ -144,3 +144,52 @@ def test_an_unconfirmed_command_is_mentioned(fake: FakeServer, open_page: OpenPa
         page.wait_for_selector("text=before the robot confirmed: new-trial")
     finally:
         fake._answer = answer  # type: ignore[method-assign]
+
+
+@pytest.mark.parametrize(
+    ("method", "enabled", "hold", "words"),
+    [
+        ("policy", True, True, "The robot has stopped."),
+        ("policy", False, False, "The robot has stopped."),
+        ("direct", True, False, "The robot has stopped."),
+        ("autonomy", True, False, "Autonomy goes on by itself."),
+    ],
+)
+def test_a_lost_line_says_what_the_arm_does(
+    fake: FakeServer, open_page: OpenPage, method: str, enabled: bool, hold: bool, words: str
+):
+    """It stops under direct control and with `--hold-on-loss`; what helps by itself goes on."""
+    fake.hello["hold_on_loss"] = hold
+    fake.status["trial"]["method"] = method
+    fake.status["settings"] = {**fake.status["settings"], "method": method, "enabled": enabled}
+    page = open_page()
+    fake.refuse = True
+    fake.drop()
+    page.wait_for_selector(f"text=Connection lost. {words}")
+
+
+def test_a_blind_page_does_not_guess_what_the_arm_does(fake: FakeServer, open_page: OpenPage):
+    """Where a study hides method and settings."""
+    for hidden in ("settings", "settings_id"):
+        fake.status.pop(hidden)
+    fake.hello.pop("settings")
+    fake.status["trial"].pop("method")
+    page = open_page()
+    fake.refuse = True
+    fake.drop()
+    page.wait_for_selector("text=Connection lost. Nobody steers the robot.")
+
+
+def test_input_that_does_not_count_is_said(fake: FakeServer, open_page: OpenPage):
+    """The line holds: what to do, and what the arm does meanwhile; gone with the first input."""
+    page = open_page()
+    banner = page.get_by_test_id("banner-unheard")
+    assert banner.is_hidden()
+    fake.status["loss"] = "blur"
+    banner.get_by_text("Click into the page to steer").wait_for()
+    assert "Another window is in front. Policy goes on by itself." in banner.inner_text()
+    fake.hello["hold_on_loss"] = True
+    fake.send(fake.hello)
+    banner.get_by_text("Another window is in front. The robot stands still.").wait_for()
+    fake.status["loss"] = ""
+    banner.wait_for(state="hidden")

@@ -21,7 +21,14 @@ PATIENCE_S = 120.0
 class Live:
     """A running worker with one page, c1, in control."""
 
-    def __init__(self, sessions: Path, name: str = "live", scene: str = "default", **options: Any):
+    def __init__(
+        self,
+        sessions: Path,
+        name: str = "live",
+        scene: str = "default",
+        entry: Callable[[WorkerSpec, socket.socket], None] = main,
+        **options: Any,
+    ):
         context = multiprocessing.get_context("forkserver")
         context.set_forkserver_preload(["app.session.preload"])
         forkserver.ensure_running()
@@ -29,7 +36,7 @@ class Live:
         spec = WorkerSpec(name, scene, settings, str(sessions), options=options)
         self.folder = sessions / "demo" / "data" / "raw" / f"subject-{name}" / "session-1"
         self.sock, far = socket.socketpair()
-        self.process = context.Process(target=main, args=(spec, far), daemon=True)
+        self.process = context.Process(target=entry, args=(spec, far), daemon=True)
         self.process.start()
         far.close()
         self.messages: list[Message] = []

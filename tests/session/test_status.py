@@ -63,9 +63,11 @@ def test_a_status_holds_every_field_of_the_contract(frame: Frame):
     """And is finite JSON of bounded size."""
     message = status(frame)
     fields = """type trial belief hand hand_quaternion objects direct assistance executed
-        assist_stick loop settings settings_id layers camera value_range leading_target reason"""
+        assist_stick sticks loss loop settings settings_id layers camera value_range
+        leading_target reason"""
     assert set(message) == set(fields.split())
-    trial = """number target method shown_as phase outcome seconds input grasped scene seed"""
+    trial = """number target method shown_as phase outcome seconds input grasped scene
+        seed simulated"""
     assert set(message["trial"]) == set(trial.split())
     assert sum(message["belief"].values()) == pytest.approx(1.0)
     text = msgspec.json.encode(message)
@@ -92,12 +94,12 @@ def test_hello_tells_no_method_in_a_blind_study(scene: Scene, frame: Frame):
     """Names of methods and settings stay in the worker."""
 
     def hello(hide: tuple[str, ...]) -> dict[str, Any]:
-        return hello_message(
-            "abc", scene, frame.view, "policy", {}, recorded=True, watch=None, hide=hide
-        )
+        given: dict[str, Any] = {"recorded": True, "hold_on_loss": True, "watch": None}
+        return hello_message("abc", scene, frame.view, "policy", {}, hide=hide, **given)
 
     assert hello(())["methods"][0] == "direct"
     assert [item["colour"] for item in hello(())["scene"]["objects"]] == list(scene.object_names)
+    assert hello(())["hold_on_loss"] is True
     blind = json.dumps(hello(("method", "settings")))
     assert "policy" not in blind and "gain" not in blind
 

@@ -1,6 +1,7 @@
 """`serve` as a process: what it prints, what it refuses, and how it ends."""
 
 import contextlib
+import importlib
 import os
 import re
 import signal
@@ -14,8 +15,10 @@ import httpx
 import psutil
 import pytest
 
+from app.cli import build_parser
 from app.recording.store import session_folder
 from app.session.spec import WorkerSpec
+from app.simulate.attract import main as attract_main
 from app.web.config import ConfigError, ServerConfig
 from app.web.housekeeping import complete_session, forget_old
 from app.web.run import ServeError, bind, serve
@@ -166,3 +169,14 @@ def test_a_session_without_torn_logs_needs_nothing(tmp_path: Path):
     """A worker may die before its first trial."""
     spec = WorkerSpec(id="abc", scene="default", settings={}, sessions=str(tmp_path))
     assert complete_session(spec) == 0
+
+
+def test_attract_lets_simulated_users_drive():
+    """The option chooses what the workers run; without it nobody simulated is there."""
+    parse = build_parser().parse_args
+    plain = ServerConfig.from_arguments(parse(["run"]))
+    attract = ServerConfig.from_arguments(parse(["run", "--attract"]))
+    assert plain.worker_entry == "app.session.worker:main"
+    module, _, name = attract.worker_entry.partition(":")
+    assert getattr(importlib.import_module(module), name) is attract_main
+    assert module in attract.preload and set(plain.preload) < set(attract.preload)
