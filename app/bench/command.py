@@ -12,7 +12,7 @@ def bench(
     *,
     sessions: Sequence[int] = (),
     seconds: float = 15.0,
-    minutes: float = 60.0,
+    minutes: float | None = None,
     keep: bool = False,
 ) -> Figures:
     """Run the benches; names map to {median, p99, unit}, for others as their docstrings say.
@@ -20,10 +20,10 @@ def bench(
     The browser's latency is left out, with a line saying so, where there is no browser.
 
     Args:
-        what: "all", "assist", "simulate", "capacity" or "soak".
+        what: "all", "assist", "simulate", "review", "capacity" or "soak".
         sessions: Sessions at once, for capacity and soak; empty: their own choice.
         seconds: How long capacity tries each number [s].
-        minutes: How long the soak runs.
+        minutes: How long the soak runs, or the reviewed trial is; None: 60, or 10.
         keep: Whether the measured capacity is kept for servers on this machine.
 
     Raises:
@@ -37,6 +37,10 @@ def bench(
         from app.bench.simulate import bench_simulate
 
         return bench_simulate()
+    if what == "review":
+        from app.bench.review import bench_review
+
+        return bench_review(minutes or 10.0)
     if what == "capacity":
         from app.bench.capacity import SIZES, bench_capacity
 
@@ -44,7 +48,7 @@ def bench(
     if what == "soak":
         from app.bench.soak import bench_soak
 
-        return bench_soak(minutes, sessions[0] if sessions else 4)
+        return bench_soak(minutes or 60.0, sessions[0] if sessions else 4)
     from app.bench.latency import bench_latency
     from app.bench.loop import bench_loop
     from app.bench.record import bench_record

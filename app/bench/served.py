@@ -1,9 +1,9 @@
-"""`hindsight run` as a process of its own, and what it and its workers use."""
+"""A server of ours as a process of its own, and what it and its workers use."""
 
 import contextlib
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -61,8 +61,19 @@ def served(sessions: Path, capacity: int) -> Iterator[Served]:
     Raises:
         ServedError: With what the server said.
     """
-    command = [sys.executable, "-u", "-m", "app", "run", "--port", "0"]
-    command += ["--sessions", str(sessions), "--capacity", str(capacity)]
+    command = ["run", "--port", "0", "--sessions", str(sessions), "--capacity", str(capacity)]
+    with running(command) as server:
+        yield server
+
+
+@contextlib.contextmanager
+def running(arguments: Sequence[str]) -> Iterator[Served]:
+    """Run `hindsight` with these arguments, which serve something; ended at the end.
+
+    Raises:
+        ServedError: With what the server said.
+    """
+    command = [sys.executable, "-u", "-m", "app", *arguments]
     process = psutil.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     try:
         yield Served(_read_address(process), process)
@@ -81,7 +92,7 @@ def _read_address(process: psutil.Popen) -> str:
         said += line
         for word in line.split():
             if word.startswith("http://"):
-                return word.rstrip("/.,")
+                return word.rstrip("/.,").removesuffix("/review")
     raise ServedError(f"the server ended before it named its address:\n{said}")
 
 

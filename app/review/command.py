@@ -9,7 +9,7 @@ from pathlib import Path
 
 from app.review.errors import ReviewError
 from app.review.folder import ReviewFolder
-from app.review.secret import Password, write_password
+from app.review.secret import Password, desk_password, write_password
 from app.review.server import create_review_app, review_config
 from app.web.config import ServerConfig
 from app.web.run import HindsightServer, address, bind, serve_until_signal
@@ -31,7 +31,8 @@ def review(
         host: Address to listen on; beyond this machine only behind a TLS proxy and a password.
         port: TCP port; 0: any free one.
         public_origin: Origin of the TLS proxy in front; empty: there is none.
-        password_file: Written by `ask_password`; needed behind a proxy, allowed without one.
+        password_file: Written by `ask_password`; allowed anywhere; behind a
+            proxy the password of the desk is asked for where none is named.
         open_browser: Open the page once the server listens.
 
     Raises:
@@ -39,7 +40,7 @@ def review(
     """
     logging.basicConfig(format="%(asctime)s %(name)s %(levelname)s: %(message)s")
     config = review_config(folder, host, port, public_origin)
-    password = _password(config, password_file)
+    password = _password(config, folder, password_file)
     application = create_review_app(config, ReviewFolder(folder), password)
     with bind(config) as listener:
         url = f"{address(config, listener)}/review"
@@ -49,15 +50,17 @@ def review(
         serve_until_signal(HindsightServer(config, application), listener)
 
 
-def _password(config: ServerConfig, path: Path | None) -> Password | None:
-    if path is not None:
-        return Password(path)
-    if config.behind_tls_proxy:
-        raise ReviewError(
-            "recorded trials are served beyond this machine behind a password only: write one "
-            "with `hindsight review --set-password FILE`, then say --password-file FILE"
-        )
-    return None
+def _password(config: ServerConfig, folder: Path, path: Path | None) -> Password | None:
+    """What is asked for: beyond this machine always something, on it only what was named."""
+    if path is None and config.behind_tls_proxy:
+        path = desk_password(folder)
+        if path is None:
+            raise ReviewError(
+                "recorded trials are served beyond this machine behind a password only: the one "
+                "of the experimenter's desk (`hindsight study password`), or one of the review's "
+                "own: `hindsight review --set-password FILE`, then say --password-file FILE"
+            )
+    return Password(path) if path is not None else None
 
 
 def ask_password(path: Path) -> None:

@@ -1,18 +1,24 @@
-"""The password of a review that is served beyond its own machine: kept as a salted scrypt hash."""
+"""The password of a review that is served beyond its own machine: kept as a salted scrypt hash.
 
-import base64
+The line is that of a study's desk (`hindsight study password`), so that experimenters who review
+their own study need no second password.
+"""
+
 import hashlib
 import hmac
 import os
 import secrets
 from pathlib import Path
 
+from app.recording.folders import PRIVATE
 from app.review.errors import ReviewError
 
 N, R, P = 2**15, 8, 1
 """Cost of one guess: 32 MiB and about 0.1 s."""
 MAX_MEMORY = 128 * 1024 * 1024
 MIN_LENGTH, MAX_LENGTH = 10, 1000
+DESK = Path(PRIVATE) / "desk.password"
+"""Where a folder of sessions keeps the password of its studies' desk."""
 
 
 def hash_password(password: str) -> str:
@@ -26,7 +32,7 @@ def hash_password(password: str) -> str:
             f"the password has {len(password)} characters; valid: {MIN_LENGTH} to {MAX_LENGTH}"
         )
     salt = secrets.token_bytes(16)
-    return "$".join(["scrypt", f"{N}", f"{R}", f"{P}", _text(salt), _text(_scrypt(password, salt))])
+    return "$".join(["scrypt", f"{N}", f"{R}", f"{P}", salt.hex(), _scrypt(password, salt).hex()])
 
 
 def write_password(path: Path, password: str) -> None:
@@ -45,6 +51,12 @@ def write_password(path: Path, password: str) -> None:
         raise ReviewError(f"cannot write {path}: {error.strerror}") from None
 
 
+def desk_password(folder: Path) -> Path | None:
+    """The password file of the desk whose sessions a folder holds, or is part of."""
+    places = (folder.resolve(), *folder.resolve().parents)
+    return next((place / DESK for place in places if (place / DESK).is_file()), None)
+
+
 class Password:
     """A password file that was read once."""
 
@@ -58,7 +70,7 @@ class Password:
             fields = path.read_text(encoding="utf-8").strip().split("$")
             name, n, r, p, salt, kept = fields
             self._cost = (int(n), int(r), int(p))
-            self._salt, self._kept = base64.b64decode(salt), base64.b64decode(kept)
+            self._salt, self._kept = bytes.fromhex(salt), bytes.fromhex(kept)
         except OSError as error:
             raise ReviewError(f"cannot read the password file {path}: {error.strerror}") from None
         except ValueError:
@@ -80,7 +92,3 @@ class Password:
 def _scrypt(password: str, salt: bytes, n: int = N, r: int = R, p: int = P) -> bytes:
     data = password.encode("utf-8", "surrogatepass")
     return hashlib.scrypt(data, salt=salt, n=n, r=r, p=p, maxmem=MAX_MEMORY, dklen=32)
-
-
-def _text(data: bytes) -> str:
-    return base64.b64encode(data).decode()

@@ -250,7 +250,7 @@ function picture(path, hue) {
   for (let i = 0; i < path.length; i += 2) points.push([-path[i + 1], -path[i]]);
   const line = points.map(([x, y], i) => `${i ? "L" : "M"}${x.toFixed(3)} ${y.toFixed(3)}`).join("");
   const [x, y] = points.at(-1);
-  return s("svg", { class: "spark", viewBox: "-0.35 -0.75 0.7 0.52", role: "img", "aria-label": "path of the hand", "data-hue": hue },
+  return s("svg", { class: "spark", viewBox: "-0.45 -0.92 0.9 0.66", role: "img", "aria-label": "path of the hand", "data-hue": hue },
     s("path", { d: line, "vector-effect": "non-scaling-stroke" }),
-    s("circle", { cx: x, cy: y, r: 0.045 }));
+    s("circle", { cx: x, cy: y, r: 0.055 }));
 }

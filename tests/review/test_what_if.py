@@ -65,8 +65,13 @@ def test_another_method_on_the_same_states(glass: Replay):
     asked = methods_at(glass, step)
     policy = open_loop(glass, {"method": "policy"})
     given = glass.log.steps["direct_twist"][step]
-    # Goals follow trembling objects in steps of 0.1 mm, which the moment's look does not know.
-    assert np.array(asked["policy"]) - given == pytest.approx(policy.assistance[step], abs=1e-3)
+    # Goals follow trembling objects in steps of 0.1 mm, which the moment's look does not know. For
+    # a hand already turned as it should be, that decides about which axis it is turned.
+    added = np.array(asked["policy"]) - given
+    assert added[:3] == pytest.approx(policy.assistance[step, :3], abs=1e-5)
+    assert np.linalg.norm(added[3:]) == pytest.approx(
+        np.linalg.norm(policy.assistance[step, 3:]), abs=0.01
+    )
     assert np.array(asked["direct"]) == pytest.approx(given)
 
 
