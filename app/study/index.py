@@ -75,6 +75,7 @@ class Index:
             self._db.execute(f"PRAGMA busy_timeout = {busy_ms}")
             self._db.execute("PRAGMA journal_mode = WAL")
             self._db.execute("PRAGMA synchronous = FULL")
+            self._db.execute("PRAGMA secure_delete = ON")  # deleted rows are overwritten
             self._db.executescript(_SCHEMA)
 
     def close(self) -> None:
@@ -138,31 +139,15 @@ class Index:
         with self._write() as db:
             self._put(db, entry)
 
-    def touch(self, participant: str) -> None:
-        """Note a sign of life."""
-        with self._write() as db:
-            db.execute(
-                "UPDATE participants SET seen_s = ? WHERE study = ? AND id = ?",
-                (time.time(), self._study, participant),
-            )
-
     def remove(self, participant: str) -> int:
-        """Delete a participant's rows; returns how many."""
+        """Delete a participant's rows, from the file as well; returns how many."""
         with self._write() as db:
             key = (self._study, participant)
             n = db.execute("DELETE FROM participants WHERE study = ? AND id = ?", key).rowcount
             n += db.execute("DELETE FROM trials WHERE study = ? AND participant = ?", key).rowcount
+        with self._errors():  # else the write-ahead log still holds what was deleted
+            self._db.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchall()
         return n
-
-    def find(self, column: str, value: str) -> Entry | None:
-        """By id, token, request, person or withdrawal."""
-        with self._errors():
-            return self._find(self._db, column, value)
-
-    def all(self) -> list[Entry]:
-        """Every participant, by number."""
-        with self._errors():
-            return [self._entry(row) for row in self._select(self._db, "1 = ?", 1)]
 
     def put_row(self, participant: str, trial: int, row: dict[str, Any]) -> None:
         """Keep the table row of a finished trial."""

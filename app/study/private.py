@@ -75,11 +75,10 @@ class PrivateFolder:
 
     def forget(self, participant: str) -> bool:
         """Delete all that is known of a participant; whether there was anything."""
-        path = self.path / f"{participant}.json"
-        if not path.exists():
-            return False
-        path.unlink()
-        return True
+        paths = list(self.path.glob(f"{participant}.*"))  # their file, and notes on them
+        for path in paths:
+            path.unlink()
+        return bool(paths)
 
     def write_text(self, name: str, text: str) -> None:
         """Write a small file that only its owner may read."""

@@ -269,16 +269,29 @@ def _end(state: State, event: AttemptEnded) -> State:
     state = replace(state, attempts=attempts)
     if state.step.page == "free":
         return state
-    failures = sum(
-        a.started.index == state.at and a.outcome not in NOT_FAILED and not a.discarded
-        for a in state.attempts
-    )
+    failures = _failures(state)
     if event.outcome == "grasped" or failures >= state.max_attempts or state.extra >= 0:
         if state.extra >= 0:
             again = event.outcome in ("interrupted", "aborted")
             return state if again else replace(state, extra=-1)
         return _forward(state)
     return state
+
+
+def _failures(state: State) -> int:
+    """Attempts at the due trial that count towards the most."""
+    return sum(
+        a.started.index == state.at
+        and bool(a.outcome)
+        and a.outcome not in NOT_FAILED
+        and not a.discarded
+        for a in state.attempts
+    )
+
+
+def is_last_chance(state: State) -> bool:
+    """Whether the due trial is over even if this attempt fails."""
+    return state.extra >= 0 or _failures(state) + 1 >= state.max_attempts
 
 
 def _redo(state: State, event: Redone) -> State:

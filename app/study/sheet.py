@@ -44,8 +44,8 @@ def run_sheet(study: Study) -> str:
     ]
     after = [
         "Page shows “Everything is saved”",
-        "Dashboard: participant completed, no trial marked interrupted without a reason",
-        "Notes into the dashboard, not onto this sheet",
+        "Desk: participant completed, no trial marked interrupted without a reason",
+        "Notes into the desk, not onto this sheet",
     ]
     return (
         f'<!doctype html><html lang="en"><meta charset="utf-8"><title>Run sheet</title>'
@@ -58,7 +58,7 @@ def run_sheet(study: Study) -> str:
         + _list("After", after)
         + "<h2>If something goes wrong</h2><p>Reload the page: it goes on where it was, and the "
         "running trial is repeated. Restart the server: the same. Anything odd: a note in the "
-        "dashboard, then “redo” for that trial.</p></html>"
+        "desk, then “redo” for that trial.</p></html>"
     )
 
 

@@ -23,7 +23,7 @@ from app.recording.errors import RecordingError
 from app.recording.folders import EVENTS_FILE, append_event, open_session, read_events
 from app.robot.scene_file import load_scene
 from app.study.errors import ProtocolError, StorageError, StudyError
-from app.study.events import NAME, AnyEvent, Consented, Left, from_line, to_detail
+from app.study.events import NAME, AnyEvent, Consented, from_line, to_detail
 from app.study.index import Entry, Index
 from app.study.plan import cells, make_plan
 from app.study.private import PrivateFolder, digest
@@ -353,14 +353,26 @@ def erase_files(store: Store, participant: str) -> list[str]:
     rows = store.index.remove(participant)
     store.people.pop(participant, None)
     store.index.put(Entry(participant, 0, -1, True, "withdrawn", 0.0))
+    numbers = {
+        "recording of a trial": n_trials,
+        "file derived from recordings": n_caches,
+        "file on the course of the session, with your answers": len(logs) - n_trials - n_caches,
+        "entry in the database": rows,
+    }
     return [
-        f"{n_trials} recordings of trials",
-        f"{n_caches} files derived from them",
-        f"{len(logs) - n_trials - n_caches} files on the course of the session, with your answers",
-        f"{rows} entries in the database",
-        "your consent, identifier and comments" if private else "no private data were kept",
+        *(_count(n, what) for what, n in numbers.items() if n),
+        "your consent, identifier and comments, and notes about your session"
+        if private
+        else "no private data were kept",
         "your lines in the tables, and with them in every export from now on",
     ]
+
+
+def _count(n: int, what: str) -> str:
+    """1 recording of a trial, 2 recordings of a trial."""
+    noun, space, rest = what.partition(" ")
+    plural = f"{noun[:-1]}ies" if noun.endswith("y") else f"{noun}s"
+    return f"{n} {noun if n == 1 else plural}{space}{rest}"
 
 
 def _gone(store: Store) -> Path:
@@ -380,6 +392,3 @@ def _lines(path: Path) -> list[dict[str, Any]]:
     except FileNotFoundError:
         return []
     return [msgspec.json.decode(line) for line in lines if line.startswith(b"{")]
-
-
-__all__ = ["Left", "Person", "Store", "design_digest", "erase_files", "mend"]

@@ -150,15 +150,19 @@ class Visitor:
 
     def submit(self, state: dict[str, Any]) -> dict[str, Any]:
         """Answer or leave the page of a step."""
+        return self.want(**self.wish(state))
+
+    def wish(self, state: dict[str, Any]) -> dict[str, Any]:
+        """What the page of a step sends when it is done."""
         step, at = state["step"], state["at"]
         if step == "consent":
-            return self.want(do="consent", request=self.request, agree=True)
+            return {"do": "consent", "request": self.request, "agree": True}
         if step == "device":
-            return self.want(do="answer", at=at, page="device", values=DEVICE_REPORT)
+            return {"do": "answer", "at": at, "page": "device", "values": DEVICE_REPORT}
         if "form" in state:
-            values = fill(state["form"])
-            return self.want(do="answer", at=at, page=state["form"]["page"], values=values)
-        return self.want(do="continue", at=at, page=state["leave"])
+            page, values = state["form"]["page"], fill(state["form"])
+            return {"do": "answer", "at": at, "page": page, "values": values}
+        return {"do": "continue", "at": at, "page": state["leave"]}
 
     def do_trial(self, due: dict[str, Any]) -> None:
         """One attempt at the trial that is due, up to its outcome."""

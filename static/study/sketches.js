@@ -5,13 +5,14 @@ import { s } from "../dom.js";
 const DRAW = {
   sticks: () => [
     stick(90, "up", "down", "", "", 0, -26), word(90, 168, "left stick: height"),
-    stick(330, "away", "near", "left", "right", 22, -14), word(330, 168, "right stick: over the table"),
+    stick(330, "away", "near", "left", "right", 12, -28), word(330, 168, "right stick: over the table"),
   ],
   target: () => [
     s("path", { d: "M90 112 L330 112 L380 150 L40 150 Z", class: "table" }),
     s("ellipse", { cx: 236, cy: 130, rx: 40, ry: 11, class: "ring" }),
     s("path", { d: "M220 66 L252 66 L248 130 L224 130 Z", class: "glass" }),
-    s("path", { d: "M70 50 L150 50 M150 30 L150 84 M150 32 L206 32 M150 82 L206 82", class: "hand" }),
+    // The two fingers lie level, one on each side of the glass, as the real hand does.
+    s("path", { d: "M60 88 L146 88 M156 74 L136 102 M156 74 L208 74 M136 102 L190 102", class: "hand" }),
     word(210, 172, "bring the open hand around the object with the ring, then close it"),
   ],
 };

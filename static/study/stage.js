@@ -31,6 +31,8 @@ export function createStage(page) {
   const card = createCard(say);
   /** @type {any} */
   let due = null;
+  /** @type {any} what was due when the trial that is shown began */
+  let ending = null;
   /** @type {Socket|null} */
   let socket = null;
   let session = "";
@@ -123,7 +125,7 @@ export function createStage(page) {
     task.render(due);
     sticks.render();
     setHidden(byId("grasp-column"), due?.part === "free");
-    setAttribute(byId("grasp"), "aria-disabled", trial()?.phase !== "running");
+    setAttribute(byId("grasp"), "aria-disabled", trial()?.phase !== "running" || store.state.hello?.control !== true);
     card.show(...content());
   }
 
@@ -136,9 +138,10 @@ export function createStage(page) {
     if (hello?.control === false) return ["info", "This study is open in another tab", "Please go on there. This tab takes over when the other one is closed.", []];
     const now = trial();
     if (!now || !due) return ["info", "Getting the robot ready …", "", []];
+    if (due.log === now.number) ending = due;
     if (now.outcome !== "running") {
       const [severity, words] = describeOutcome({ ...now, grasped: now.grasped ?? "" });
-      return [severity, words, now.outcome === "grasped" ? "Well done." : "This trial will be repeated.", []];
+      return [severity, words, now.outcome === "grasped" ? "Well done." : ending?.last ? "It goes on with the next one." : "This trial will be repeated.", []];
     }
     if (waiting()) return countdown();
     if (now.phase === "ready") return ["info", "Getting the robot ready …", "", []];

@@ -21,7 +21,7 @@ from app.study.events import (
     to_detail,
 )
 from app.study.plan import make_plan
-from app.study.protocol import State, apply, fold, initial
+from app.study.protocol import State, apply, fold, initial, is_last_chance
 from tests.study.builders import OBJECTS, advance, attempt, fast_plan, paper, start, until
 
 
@@ -190,3 +190,13 @@ def test_events_survive_their_file_and_fold_to_the_same_state():
     once = fold(initial(fast_plan(), 5), events)
     assert once == fold(initial(fast_plan(), 5), [e for e in read if e is not None])
     assert once.drafts == {}
+
+
+def test_a_person_is_told_whether_a_failed_trial_comes_again():
+    """The last of the most attempts, and further training, are not repeated."""
+    state = until(start(max_attempts=2), "trial")
+    assert not is_last_chance(state)
+    state = attempt(attempt(state, "interrupted"), "timeout")
+    assert is_last_chance(attempt(state, outcome=""))
+    after = attempt(state, "timeout")
+    assert after.index == state.index + 1 and not is_last_chance(after)

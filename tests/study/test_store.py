@@ -19,9 +19,11 @@ from app.study.tables import write_tables
 from tests.study.builders import open_store, paper, survey_answers
 
 
-def join(store: Store, name: str = "browser-0000000000", **about: Any) -> Person:
+def join(
+    store: Store, name: str = "browser-0000000000", parameters: Any = None, **about: Any
+) -> Person:
     """Somebody consents."""
-    person, _ = store.consent(name, {}, fast=True, **about)
+    person, _ = store.consent(name, parameters or {}, fast=True, **about)
     return person
 
 
@@ -177,19 +179,25 @@ def test_a_changed_design_is_refused_for_people_who_met_the_old_one(tmp_path: Pa
 
 
 def test_withdrawal_leaves_nothing_but_the_pseudonym(tmp_path: Path):
-    """Files, index, private file, rows of tables; the number is not handed out again."""
+    """Files, notes, database pages, table rows; the number is not handed out again."""
     store = open_store(tmp_path)
-    person, other = join(store), join(store, "browser-0000000002")
+    person, other = join(store, code="A secret code"), join(store, "browser-0000000002")
     while person.state.is_open:
         do(store, person)
     code = store.withdrawal_code(person.id)
+    identity = person.entry.person
+    store.private.append(f"{person.id}.notes.jsonl", {"participant": person.id, "text": "a cold"})
+    store.index.put_row(person.id, 1, {"mark": "a measured trial"})
     (person.folder / "trial-001.mcap").write_bytes(b"x")
     assert store.by_withdrawal_code(code.lower()) is person
     erased = erase_files(store, person.id)
     write_tables(store)
-    assert any("1 recordings" in line for line in erased)
+    assert "1 recording of a trial" in erased and "2 entries in the database" in erased
     assert store.by_withdrawal_code(code) is None
-    left = [p for p in store.sessions.rglob("*") if p.is_file() and FILE not in p.name]
+    left = [p for p in store.sessions.rglob("*") if p.is_file()]
+    for secret in (identity, "a measured trial", "a cold", "A secret code"):
+        assert not [p.name for p in left if secret.encode() in p.read_bytes()], secret
+    left = [p for p in left if FILE not in p.name]
     holding = [p.name for p in left if person.id.encode() in p.read_bytes() or person.id in p.name]
     assert holding == ["withdrawn.jsonl"]
     store.close()

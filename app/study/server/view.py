@@ -4,7 +4,7 @@ from typing import Any
 
 from app.study.items import AnyItem, Likert, Preference, Survey, key_of
 from app.study.plan import Step, Task
-from app.study.protocol import State, can_return, page_name
+from app.study.protocol import State, can_return, is_last_chance, page_name
 from app.study.schema import Study
 from app.study.server.host import Host, here
 from app.study.server.spec import condition_of
@@ -136,8 +136,8 @@ def _trial(host: Host, person: Person, task: Task) -> Message:
         "attempt": state.next_attempt if running is None else running.started.attempt,
         "log": running.started.trial if running is not None else 0,
         "again": before[-1] if before else "",
+        "last": is_last_chance(state),
         "countdown_s": 1.0 if person.consent.fast else study.trials.countdown_s,
-        "least_s": 0.0,
         "free_s": study.training.free_s,
         "display": condition.display if condition else "nothing",
         "device": condition.device if condition else "any",
