@@ -87,38 +87,6 @@ def test_whole_participations_in_both_orders_never_name_a_method(server: StudySe
     assert ids[0] not in {r["participant_id"] for r in table(server, "participants")}
 
 
-@pytest.mark.slow
-def test_a_killed_server_goes_on_where_everybody_was(server: StudyServer):
-    """SIGKILL with a draft and in mid-trial: nothing asked again, nothing counted twice."""
-    person = visitor(server, "killed")
-    person.do_step(person.state())
-    assert person.state()["step"] == "background"
-    draft = {"gender": "other"}
-    assert person.want(do="draft", at=1, page="background", values=draft)["status"] == 200
-    server.kill()
-    server.start()
-    state = person.state()
-    assert state["step"] == "background" and state["form"]["values"] == draft
-    while (state := person.state())["step"] != "trial":
-        person.do_step(state)
-    with person.dial(state["trial"]["session"]) as socket:
-        log = _started(person, socket)
-        server.kill()
-    server.start()
-    again = person.state()
-    assert again["step"] == "trial" and again["at"] == state["at"]
-    assert again["trial"]["attempt"] == 2 and again["trial"]["again"] == "interrupted"
-    end = person.take_part()
-    assert end["completion"]
-    trials = [r for r in table(server, "trials") if r["part"] == "recorded"]
-    assert [r["outcome"] for r in trials if int(r["trial"]) == log] == ["interrupted"]
-    counted = [(r["method"], r["object"]) for r in trials if r["counted"] == "true"]
-    assert len(counted) == len(set(counted)) == 6
-    server.kill()
-    server.start()
-    assert person.state()["completion"] == end["completion"]
-
-
 def _started(person: Visitor, socket: Any) -> int:
     """Wait for the trial, give the start signal; the log's number, while the arm is free."""
     due = 0
@@ -165,9 +133,6 @@ def test_leaving_in_mid_trial_repeats_it_and_two_tabs_share_one_control(server: 
         assert time.monotonic() < deadline
         time.sleep(0.1)
     assert now["at"] == state["at"]
-    server.kill()
-    server.start()
-    assert person.state()["at"] == state["at"]
 
 
 def _next(socket: Any, kind: str) -> dict[str, Any]:
