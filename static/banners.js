@@ -97,7 +97,7 @@ function describeLoss(page) {
   if (state === "lost") return ["bad", "This session has ended", reason || "The robot is no longer there."];
   const wait = retryAt === null ? 0 : Math.max(0, Math.ceil((retryAt - performance.now()) / 1000));
   const when = wait > 0 ? `Trying again in ${wait} s.` : "Trying again now.";
-  return ["warn", describeLostLine(page), `${when} This trial will continue.`];
+  return ["warn", describeLostLine(page), page.status?.trial.outcome === "running" ? `${when} This trial will continue.` : when];
 }
 
 function createBanner(id, action, actionIcon, act) {

@@ -16,7 +16,9 @@ export function createCoach(store) {
         remember("coached", true);
         store.update({ coach: false });
       }
-      const shown = store.state.coach && connection.state === "connected" && hello?.control === true && status?.trial.outcome === "running" && !status.trial.simulated;
+      const steers = connection.state === "connected" && hello?.control === true && status?.trial.outcome === "running" && !status.trial.simulated;
+      const away = status?.loss === "blur" || status?.loss === "hidden"; // a banner says what to do first
+      const shown = store.state.coach && steers && !away;
       setHidden(coach, !shown);
       document.body.classList.toggle("pulse", shown);
       const target = status?.trial.target;

@@ -32,7 +32,7 @@ export function createHelp() {
     h("table", {}, h("thead", {}, h("tr", {}, ...["", "Screen", "Keys", "Gamepad"].map((text) => h("th", { scope: "col" }, text)))),
       h("tbody", {}, ...CONTROLS.map((row) => h("tr", {}, ...row.map(cell))))),
     h("dl", {}, ...READ.flatMap(([hue, title, text]) => [h("dt", { dataset: { hue } }, hue ? icon("arrow", "k") : null, title), h("dd", {}, text)])),
-    h("p", { class: "dim" }, "Click a stick or reach it with Tab to push it with the arrow keys. When the page loses the focus or the connection, your input becomes zero at once."),
+    h("p", { class: "dim" }, "Click a stick or reach it with Tab to push it with the arrow keys. When the page loses the focus or the connection, your input becomes zero at once; what helps may go on by itself, and the page says so."),
   );
   dialog.addEventListener("click", (event) => event.target === dialog && dialog.close());
   dialog.addEventListener("keydown", (event) => {

@@ -80,6 +80,8 @@ function receive(message) {
 
 /** @param {import("./types.js").Hello} hello */
 function welcome(hello) {
+  const before = store.state.hello;
+  if (before?.run !== undefined && hello.run > before.run) say("warn", "The session had ended while this page was away. A new one has begun.");
   store.update({ hello });
   viewer.open(hello.view);
   document.body.dataset.control = hello.control ? "yes" : "no";

@@ -33,6 +33,7 @@
  * @property {Layers} layers
  * @property {string[]} [scenes]
  * @property {boolean} [recorded]
+ * @property {number} [run]            counts the simulations that this session has started
  * @property {boolean} [hold_on_loss]   lost input stops the arm
  * @property {string|null} [watch]      a read-only link
  *

@@ -101,7 +101,10 @@ class Pages:
 
     def _full_page(self, request: Request) -> Response:
         capacity = self._registry.workers.capacity
-        text = _FULL.read_text(encoding="utf-8").replace("{capacity}", str(capacity))
+        title = "The one place is taken" if capacity == 1 else f"All {capacity} places are taken"
+        number = "one" if capacity == 1 else f"{capacity} of them"
+        why = f"Each place is a whole simulated robot, and this machine runs {number} well."
+        text = _FULL.read_text(encoding="utf-8").replace("{title}", title).replace("{why}", why)
         headers = {"content-security-policy": page_policy(host_of(request)), "retry-after": "10"}
         return HTMLResponse(text, 503, headers=headers)
 

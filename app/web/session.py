@@ -200,6 +200,7 @@ class Session:
             "session": self.id,
             "version": __version__,
             "control": client is self.control,
+            "run": self.runs,
             "view": f"/view/{self.id}/",
             "watch": self.watch_path if self.shares_watch and client.role == "owner" else None,
         }

@@ -45,6 +45,7 @@ HELLO: dict[str, Any] = {
     "scenes": ["default", "clutter", "in_line"],
     "recorded": True,
     "hold_on_loss": False,
+    "run": 1,
     "watch": "/watch/abc",
     "methods": ["direct", "blend", "policy", "yielding", "autonomy"],
     "settings": {

@@ -35,6 +35,27 @@ def test_a_frozen_page_wakes_up_where_it_was(
     assert numbers == sorted(set(numbers))
 
 
+def test_a_page_that_slept_past_its_session_is_told(fake: FakeServer, open_page: OpenPage) -> None:
+    """After an hour its session has ended: it comes back to a new one, and says so."""
+    page = open_page()
+    devtools = page.context.new_cdp_session(page)
+
+    def sleep() -> None:
+        before = fake.connections
+        devtools.send("Page.setWebLifecycleState", {"state": "frozen"})
+        fake.drop()
+        devtools.send("Page.setWebLifecycleState", {"state": "active"})
+        fake.wait(lambda: fake.connections > before and fake.pages == 1, "it is back")
+        page.wait_for_selector(CONNECTED)
+
+    told = page.locator(".notice", has_text="The session had ended while this page was away")
+    sleep()
+    assert told.count() == 0  # a short sleep: the same session goes on
+    fake.hello["run"] = 2
+    sleep()
+    told.wait_for()
+
+
 @pytest.mark.slow
 def test_fifty_reconnects_leave_one_line_and_no_litter(
     fake: FakeServer, open_page: OpenPage

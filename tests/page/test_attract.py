@@ -1,13 +1,22 @@
 """While nobody touches a stick, a simulated user drives, and the page says so."""
 
 import math
+import re
 
 import pytest
+from playwright.sync_api import Page
 
 from tests.page.conftest import OpenPage, newest_axes
 from tests.page.fake_server import FakeServer
 
 pytestmark = pytest.mark.browser
+
+
+def knob(page: Page, side: str) -> tuple[float, float]:
+    """Where a stick's knob stands, right and up, full stick = 1."""
+    style = page.get_by_test_id(f"stick-{side}").get_attribute("style") or ""
+    found = dict(re.findall(r"--([xy]): *([-+.e0-9]+)", style))
+    return round(float(found["x"]), 6) + 0.0, round(float(found["y"]), 6) + 0.0
 
 
 def test_a_simulated_user_is_named_and_shown_at_the_sticks(fake: FakeServer, open_page: OpenPage):
@@ -25,23 +34,15 @@ def test_a_simulated_user_is_named_and_shown_at_the_sticks(fake: FakeServer, ope
         "mode": "translate",
         "yaw": yaw + math.pi / 2,
     }
-    page.wait_for_function(
-        """() => {
-          const style = (side) => document.querySelector(`#stick-${side}`).style;
-          const at = (side, axis) => Number(style(side).getPropertyValue(axis));
-          return at('left', '--y') === 0.5 && Math.abs(at('right', '--x') + 0.8) < 1e-6
-            && Math.abs(at('right', '--y')) < 1e-6;
-        }"""
-    )
+    fake.wait(lambda: knob(page, "left") == (0.0, 0.5), "the left knob stands where it is pushed")
+    fake.wait(lambda: knob(page, "right") == (-0.8, 0.0), "the right one as seen from here")
     assert newest_axes(fake) == (0, 0, 0, 0)  # what is shown is not sent
 
     page.evaluate("pointer('right', 'pointerdown', 0, 0); pointer('right', 'pointermove', 1, 0)")
     fake.wait(lambda: newest_axes(fake) == (0, 0, 1, 0), "the visitor's push arrives")
     fake.status["trial"]["simulated"] = False
     banner.wait_for(state="hidden")
-    page.wait_for_function(
-        "Number(document.querySelector('#stick-right').style.getPropertyValue('--x')) === 1"
-    )
+    fake.wait(lambda: knob(page, "right") == (1.0, 0.0), "the visitor's own push")
 
 
 def test_who_watches_is_told_too(fake: FakeServer, open_page: OpenPage):

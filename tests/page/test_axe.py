@@ -6,7 +6,7 @@ from playwright.sync_api import Page, expect
 
 from tests.page.conftest import OpenPage
 from tests.page.fake_server import FakeServer
-from tests.page.test_layout import PORTRAIT, put_into
+from tests.page.test_layout import PORTRAIT, STATES, put_into
 
 pytestmark = pytest.mark.browser
 
@@ -61,7 +61,7 @@ def test_no_part_of_the_page_has_a_serious_finding(
     assert not any(found.values()), found
 
 
-@pytest.mark.parametrize("state", ["first", "outcome", "lost", "five"])
+@pytest.mark.parametrize("state", STATES[1:])
 def test_no_state_has_a_serious_finding(fake: FakeServer, open_page: OpenPage, state: str) -> None:
     """Overlay, banners, many objects."""
     page = open_page(size=DESK, seen=state != "first", reduced_motion="reduce")

@@ -26,6 +26,12 @@ def put_into(state: str, fake: FakeServer, page: Page) -> None:
         fake.refuse = True
         fake.drop()
         expect(page.get_by_test_id("banner-lost")).to_be_visible()
+    elif state == "simulated":
+        fake.status["trial"]["simulated"] = True
+        expect(page.get_by_test_id("banner-simulated")).to_be_visible()
+    elif state == "unheard":
+        fake.status["loss"] = "blur"
+        expect(page.get_by_test_id("banner-unheard")).to_be_visible()
     elif state == "first":
         expect(page.locator("#coach .msg")).to_be_visible()
     elif state == "five":
@@ -44,7 +50,10 @@ def add_objects(fake: FakeServer) -> None:
     fake.send({**fake.hello, "scene": {"name": "clutter", "objects": objects}})
 
 
-@pytest.mark.parametrize("state", ["trial", "first", "outcome", "lost", "five"])
+STATES = ["trial", "first", "outcome", "lost", "five", "simulated", "unheard"]
+
+
+@pytest.mark.parametrize("state", STATES)
 def test_nothing_overlaps_or_leaves_the_window(fake: FakeServer, open_page: OpenPage, state: str):
     """At every size of window the page is made for, in every state."""
     page = open_page(size=SIZES[0], seen=state != "first", reduced_motion="reduce")

@@ -47,6 +47,7 @@ def test_a_killed_worker_ends_one_session_only(server: Server):
     assert server.pid_of(other.session) == other_pid
     assert gone(pid)
     again = browser.page()
+    assert (page.hello["run"], again.hello["run"]) == (1, 2)
     assert again.next("status")["session"] == "2"
     assert server.pid_of(browser.session) != pid
 

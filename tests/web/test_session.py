@@ -1,5 +1,6 @@
 """A page, its worker and its viewer, from the first request to the last."""
 
+import re
 import time
 
 import msgspec
@@ -190,8 +191,10 @@ def test_participant_n_plus_1_is_asked_to_wait_and_let_in(start_server: StartSer
     early_tab = server.browser()
     answer = late.http.get("/")
     assert answer.status_code == 503
-    assert "All 1 places are taken" in answer.text
+    assert "The one place is taken" in answer.text
     assert 'http-equiv="refresh"' in answer.text
+    for path in re.findall(r'href="(/static/[^"]+)"', answer.text):
+        assert late.http.get(path).status_code == 200
     assert server.health()["status"] == "full"
     page.socket.close()
     wait_until(lambda: late.http.get("/").status_code == 200)

@@ -31,10 +31,13 @@ OPERATOR_BY_ASPECT: tuple[tuple[float, View], ...] = (
     (0.75, View((-0.42, -1.42, 1.18), (0.47, -0.04, 0.05), 40.0)),
     (4 / 3, View((-0.42, -1.30, 1.10), (0.395, -0.02, 0.085), 38.0)),
     (1.6, View((-0.36, -1.14, 0.98), (0.45, -0.03, 0.09), 38.0)),
+    (2.1, View((-0.36, -1.14, 0.98), (0.45, -0.03, 0.18), 38.0)),
 )
-"""The operator stands to the robot's right: from behind, the arm hides the objects."""
+"""The operator stands to the robot's right: from behind, the arm hides the objects. Panels narrower
+than the first of these shapes, such as an upright phone, see the same from further away; low ones,
+such as a phone held sideways, look up a little, so that the elbow stays below the row of chips."""
 SIDE = View((0.45, -1.75, 0.5), (0.42, 0.0, 0.16), 36.0)
-TOP = View((0.415, 0.0, 2.1), (0.42, 0.0, 0.0), 36.0)
+TOP = View((0.465, 0.0, 2.1), (0.47, 0.0, 0.0), 36.0)
 """y is equal in both points: otherwise the picture rolls."""
 FITTED_ASPECT = 4 / 3
 """Side and top are framed for this width to height; narrower panels see them from further away."""
@@ -55,15 +58,21 @@ def view_for(preset: str, aspect: float) -> View:
         views = [view for _, view in OPERATOR_BY_ASPECT]
         x, y, z = (between([v.position[i] for v in views]) for i in range(3))
         at_x, at_y, at_z = (between([v.look_at[i] for v in views]) for i in range(3))
-        return View((x, y, z), (at_x, at_y, at_z), between([v.fov_degrees for v in views]))
+        view = View((x, y, z), (at_x, at_y, at_z), between([v.fov_degrees for v in views]))
+        return _from_further(view, aspects[0] / aspect)
     if preset not in PRESETS:
         raise CameraError(
             f"camera {preset!r} does not exist; valid are: {', '.join((*PRESETS, RESET))}"
         )
-    view = SIDE if preset == "side" else TOP
-    away = max(1.0, FITTED_ASPECT / aspect)
+    return _from_further(SIDE if preset == "side" else TOP, FITTED_ASPECT / aspect)
+
+
+def _from_further(view: View, times: float) -> View:
+    """The same view from so many times as far away, never from nearer."""
+    if times <= 1.0:
+        return view
     eye, target = np.asarray(view.position), np.asarray(view.look_at)
-    x, y, z = (target + away * (eye - target)).tolist()
+    x, y, z = (target + times * (eye - target)).tolist()
     return View((x, y, z), view.look_at, view.fov_degrees)
 
 
