@@ -37,15 +37,23 @@ PRESETS: dict[str, dict[str, Any]] = {
 }
 
 METHOD_DEFAULTS: dict[str, dict[str, Any]] = {
-    # Twice the assistance is felt as help rather than as a will of its own only where it gives way.
-    "yielding": {"gain": 2.0},
+    # Argued in docs/method.md: stronger help is felt as help where it gives way.
+    "yielding": {
+        "gain": 2.0,
+        "w_l": 80.0,
+        "translation_offset": 1.5,
+        "step": "exact",
+        "beta": 48.0,
+        "idle_drift": 2.0,
+    },
 }
 
 
 def preset(name: str = "default", **changes: Any) -> AssistanceSettings:
     """Return the settings of a preset with some fields changed, e.g. `method="blend"`.
 
-    Under `default`, a method may bring its own defaults (`yielding`: gain 2); `changes` win.
+    Under `default`, a method may bring its own defaults (`yielding`: stronger help); `changes`
+    win.
 
     Raises:
         CoreError: If the preset or a field is unknown or a value is not valid.

@@ -43,9 +43,12 @@ def _server() -> Iterator[FakeServer]:
         yield running
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def browser() -> Iterator[Browser]:
-    """A headless Chromium; without GL, since the stand-in's viewer draws nothing."""
+    """A headless Chromium; without GL, since the stand-in's viewer draws nothing.
+
+    Closed when this folder is through: Playwright runs once in a process at a time.
+    """
     path = find_browser()
     assert path, "no Chromium found: `make browser` installs it or says how"
     with sync_playwright() as playwright:
