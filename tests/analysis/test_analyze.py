@@ -110,6 +110,7 @@ def test_exclusions_say_who_why_and_by_which_rule(reported: Path) -> None:
     assert not set(expected) & set(results["participants"])
 
 
+@pytest.mark.slow
 def test_the_same_folder_gives_the_same_report(tmp_path: Path) -> None:
     """No clock and no chance in the page: the bytes are equal."""
     folder = make_study(tmp_path / "study", n=5)
@@ -137,6 +138,7 @@ def test_a_missing_column_is_named(tmp_path: Path) -> None:
         analyze(folder)
 
 
+@pytest.mark.slow
 def test_one_participant_is_described_but_not_tested(tmp_path: Path) -> None:
     """Means and figures; no hypothesis is answered, and the report says why."""
     report = analyze(make_study(tmp_path, n=1, logs=1))
@@ -172,6 +174,7 @@ def test_a_torn_folder_loses_only_what_is_torn(tmp_path: Path) -> None:
     assert len(results_of(report)["participants"]) == 6
 
 
+@pytest.mark.slow
 def test_without_a_table_rows_come_from_the_logs(tmp_path: Path) -> None:
     """Only logs: the derived times are the summaries', and an unfinished log is said."""
     folder = make_study(tmp_path / "study", n=4, logs=4, failures=False)

@@ -159,6 +159,7 @@ def test_arrays_of_another_layout_are_taken(monkeypatch: pytest.MonkeyPatch) -> 
         np.testing.assert_allclose(getattr(step, name), getattr(expected, name), atol=1e-12)
 
 
+@pytest.mark.slow
 def test_kernels_compile_where_no_cache_can_be_written() -> None:
     """A read-only installation compiles without the cache and without a word."""
     script = (

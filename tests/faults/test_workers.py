@@ -19,7 +19,7 @@ from tests.faults.entries import CLOCK_STEP_S
 from tests.web.conftest import Browser, Page, Server, StartServer, wait_until
 from tests.web.test_faults import gone
 
-pytestmark = pytest.mark.timeout(600)
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
 Fault = Callable[..., None]
 
 

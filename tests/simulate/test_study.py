@@ -140,6 +140,7 @@ def _deadly_chunk(indices: tuple[int, ...]) -> pool.Done:
     os._exit(9)
 
 
+@pytest.mark.slow
 def test_trials_of_a_dead_worker_are_run_again_and_counted_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
@@ -154,6 +155,7 @@ def test_trials_of_a_dead_worker_are_run_again_and_counted_once(
     assert run.complete and run.rows == expected
 
 
+@pytest.mark.slow
 def test_workers_that_always_die_end_the_study_with_a_reason(monkeypatch: pytest.MonkeyPatch):
     """Instead of trying for ever."""
     monkeypatch.setattr(pool, "_work", _deadly_chunk)
