@@ -31,10 +31,12 @@ plots: $(STAMP)  ## fetch the review page's plotting library again (needs the ne
 browser: $(STAMP)  ## find or install a Chromium for the browser tests
 	@$(BIN)/python tests/find_browser.py
 
-# A browser with software GL needs both cores to itself: those tests run one by one.
+# A browser that draws with software GL needs both cores to itself: those tests run one by one. The
+# page's own tests draw nothing.
 test: $(STAMP) browser  ## all tests but the slow ones, at most 8 minutes on two cores
 	$(PYTEST) -m "not slow and not browser"
-	$(BIN)/pytest -m "browser and not slow"
+	$(PYTEST) -m "not slow" tests/page
+	$(BIN)/pytest -m "browser and not slow" --ignore tests/page
 
 test-all: $(STAMP) browser  ## what `make test` leaves out, at most 30 minutes on two cores
 	$(PYTEST) -m "slow and not browser"

@@ -12,7 +12,7 @@ from tests.web.conftest import StartServer, wait_until
 from tests.web.test_faults import gone
 from tests.web.test_run import browsing
 
-pytestmark = pytest.mark.timeout(300)
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
 PRELOAD = ("viser", "tests.faults.short_patience")
 
 SCRIPT = f"""
