@@ -163,6 +163,7 @@ class _Page:
             origin=url,  # pyright: ignore[reportArgumentType]
             additional_headers={"Cookie": self._cookie},
             compression=None,
+            max_queue=None,  # it is not read while the list and the curves are waited for
             max_size=None,
             proxy=None,
         )

@@ -195,22 +195,8 @@ export class TrialList extends EventTarget {
     element.title = trial.problem || trial.id;
     const usable = isUsable(trial);
     setAttribute(element, "aria-disabled", !usable);
-    const { hue, glyph } = describe(trial.instructed_goal || "");
-    const ran = trial.steps > 0;
     const compare = h("input", { type: "checkbox", "aria-label": `Compare ${titleOfTrial(trial)}`, disabled: !usable, on: { click: (event) => event.stopPropagation(), change: (event) => this.#choose(trial.id, event.target) } });
-    const outcome = h("td", { class: `oc ${tone(trial)}` }, h("span", {}, icon(tone(trial) === "ok" ? "check" : tone(trial) === "bad" ? "cross" : "info", "k"), outcomeOf(trial)));
-    if (trial.flag) outcome.append(icon("flag", "k flagged"), h("span", { class: "unseen" }, "flagged"));
-    element.replaceChildren(
-      h("td", {}, compare),
-      h("td", { class: "num" }, titleOfTrial(trial)),
-      trial.problem ? h("td", { colspan: 2, class: "why" }, trial.problem) : h("td", {}, inWords(trial.method)),
-      ...(trial.problem ? [] : [h("td", {}, h("span", { class: "obj", dataset: { hue } }, icon(glyph, "k"), inWords(trial.instructed_goal)))]),
-      outcome,
-      h("td", {}, trial.path ? picture(trial.path, hue) : null),
-      h("td", { class: "rt num" }, ran ? trial.duration_s.toFixed(1) : "–"),
-      h("td", { class: "rt num" }, ran ? trial.input_s.toFixed(1) : "–"),
-      h("td", { class: "rt num" }, trial.opposed == null ? "–" : (100 * trial.opposed).toFixed(0)),
-    );
+    element.replaceChildren(h("td", {}, compare), ...(trial.problem ? [complaint(trial)] : cells(trial)));
     return element;
   }
 
@@ -243,6 +229,32 @@ export class TrialList extends EventTarget {
 
 /** Whether a trial can be opened. */
 export const isUsable = (trial) => !trial.problem && trial.id.endsWith(".mcap");
+
+/** What a row says of a trial. */
+function cells(trial) {
+  const { hue, glyph } = describe(trial.instructed_goal || "");
+  const ran = trial.steps > 0;
+  const outcome = h("td", { class: `oc ${tone(trial)}` }, h("span", {}, icon(tone(trial) === "ok" ? "check" : tone(trial) === "bad" ? "cross" : "info", "k"), outcomeOf(trial)));
+  if (trial.flag) outcome.append(icon("flag", "k flagged"), h("span", { class: "unseen" }, "flagged"));
+  return [
+    h("td", { class: "num" }, titleOfTrial(trial)),
+    h("td", {}, inWords(trial.method)),
+    h("td", {}, h("span", { class: "obj", dataset: { hue } }, icon(glyph, "k"), inWords(trial.instructed_goal))),
+    outcome,
+    h("td", {}, trial.path ? picture(trial.path, hue) : null),
+    h("td", { class: "rt num" }, ran ? trial.duration_s.toFixed(1) : "–"),
+    h("td", { class: "rt num" }, ran ? trial.input_s.toFixed(1) : "–"),
+    h("td", { class: "rt num" }, trial.opposed == null ? "–" : (100 * trial.opposed).toFixed(0)),
+  ];
+}
+
+/** What is wrong with a log, in the place of all it cannot tell: "p01, trial-011 is torn: …". */
+function complaint(trial) {
+  const file = trial.id.split("/").at(-1).replace(/\.mcap(\.part)?$/, "");
+  const name = [trial.participant, file].filter(Boolean).join(", ");
+  const [before, after = ""] = trial.problem.includes(trial.id) ? trial.problem.split(trial.id, 2) : ["", `: ${trial.problem}`];
+  return h("td", { class: "why", colspan: COLUMNS.length - 1 }, icon("cross", "k"), h("span", {}, before, h("b", {}, name), after));
+}
 
 /** The hand's path from above: away from the robot is up, the robot's left is left. */
 function picture(path, hue) {

@@ -1,6 +1,6 @@
 /** The signals beside the replay: one uPlot a panel, one playhead through all of them. */
 
-import { h, setText } from "../dom.js";
+import { h, s, setText } from "../dom.js";
 import { describeObjects } from "../objects.js";
 import { rowOf } from "./steps.js";
 
@@ -81,9 +81,12 @@ class Panel {
     this.plots.zoomTo({ min, max });
   }
 
+  /** The number in the corner is the first curve's; among goals it is the instructed one's. */
   follow() {
     const { plots } = this;
-    const first = (plots.comparison ?? plots.trial)?.arrays[this.about.curves[0].array];
+    const wanted = plots.trial?.meta.instructed_goal;
+    const curve = this.about.curves.find(({ role }) => role === `goal:${wanted}` && this.about.curves[0].role.startsWith("goal:")) ?? this.about.curves[0];
+    const first = (plots.comparison ?? plots.trial)?.arrays[curve.array];
     if (first) setText(this.value, `${number(first[plots.row] ?? NaN)} ${this.about.unit}`.trim());
     if (!this.plot) return;
     const at = this.plot.valToPos(plots.position, "x");
@@ -242,8 +245,9 @@ export class Plots {
   }
 }
 
+/** A piece of the curve as it is drawn, dashes included. */
 function swatch(colour, dash) {
-  return h("i", { class: dash ? "dashed" : null, style: `color:${colour}` });
+  return s("svg", { viewBox: "0 0 24 2", "aria-hidden": "true" }, s("path", { d: "M0 1H24", style: `stroke:${colour}`, "stroke-dasharray": dash?.join(" ") ?? "none" }));
 }
 
 /** A curve that never moves still gets a scale around it; zero stays in sight where it is near. */

@@ -89,7 +89,7 @@ export function createWhatIf(page) {
 
   const explain = () => {
     const { meta } = result;
-    const lines = [h("p", {}, h("b", {}, result.name), result.loop === "open" ? ": on the logged states, drawn dashed in white." : `: re-simulated from ${seconds(page.player.secondsOf(meta.first))} s on.`)];
+    const lines = [h("p", {}, h("b", {}, result.name), result.loop === "open" ? ": on the logged states, drawn with dashes." : `: re-simulated from ${seconds(page.player.secondsOf(meta.first))} s on.`)];
     if (result.loop === "closed") {
       const ended = meta.outcome === "running" ? "had not ended when the inputs did" : `ended: ${inWords(meta.outcome)}${meta.grasped_object ? ` (${inWords(meta.grasped_object)})` : ""}`;
       lines.push(h("p", {}, `It ${ended}. The log: ${inWords(trial.meta.summary?.outcome ?? "unknown")}.`), h("p", { class: "warn" }, meta.caveat));
