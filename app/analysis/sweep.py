@@ -9,6 +9,8 @@ SWEEP.yaml:
       - {parameter: user.delay_s, from: 0.1, to: 0.5, count: 5}
     design: grid            # or one-at-a-time: the others stay as in base
     measures: [time_s, input_s, felt_control]
+    against: blend          # optional: draw blend's mean ÷ each other method's instead
+    marks: {time_s: 1.55}   # optional: a value to compare with, drawn as a line
 
 What `base` may hold and what parameters exist is the simulation's to say; it is called once per
 point with `base` and the point's values under "parameters".
@@ -74,6 +76,8 @@ class Sweep(BaseModel):
     vary: list[Varied] = Field(min_length=1)
     design: Literal["grid", "one-at-a-time"] = "grid"
     measures: list[str] = ["time_s", "input_s", "felt_control"]
+    against: str | None = None
+    marks: dict[str, float] = {}
 
     @model_validator(mode="after")
     def _known(self) -> "Sweep":
@@ -148,7 +152,15 @@ def summarise_sweep(rows: Frame, sweep: Sweep) -> Frame:
 
     Columns: parameter, level, method, measure, mean, se, n; in a grid each level is averaged over
     the other parameters. `success` is the share of all trials; the others are of successful ones.
+    With `against`, "mean" is that method's mean ÷ the method's over the participants of both, and
+    its standard error is the jackknife's.
+
+    Raises:
+        AnalysisError: If `against` is not among the methods that were run.
     """
+    if sweep.against is not None and sweep.against not in set(rows["method"]):
+        ran = ", ".join(sorted(set(rows["method"])))
+        raise AnalysisError(f"against is {sweep.against!r}; valid: {ran}")
     tables = []
     for varied in sweep.vary:
         name = varied.parameter
@@ -158,9 +170,28 @@ def summarise_sweep(rows: Frame, sweep: Sweep) -> Frame:
             used = there if measure == "success" else there[there["success"].astype(bool)]
             used = used.assign(value=used[measure].astype(float)).dropna(subset=["value"])
             people = used.groupby([name, "method", "participant_id"])["value"].mean()
-            table = people.groupby([name, "method"]).agg(["mean", "std", "size"]).reset_index()
-            table["se"] = table["std"] / table["size"] ** 0.5
-            table = table.rename(columns={name: "level", "size": "n"}).drop(columns="std")
+            if sweep.against is None:
+                table = people.groupby([name, "method"]).agg(["mean", "sem", "size"]).reset_index()
+                table = table.rename(columns={name: "level", "sem": "se", "size": "n"})
+            else:
+                table = _ratios(people, sweep.against)
             tables.append(table.assign(parameter=name, measure=measure))
     columns = ["parameter", "level", "method", "measure", "mean", "se", "n"]
     return pd.concat(tables, ignore_index=True)[columns]
+
+
+def _ratios(people: Any, against: str) -> Frame:
+    """Mean of `against` ÷ mean of each other method, per level."""
+    found = []
+    for level, wide in people.unstack("method").groupby(level=0):
+        for method in wide.columns.drop(against):
+            both = wide[[against, method]].dropna().to_numpy()
+            n = len(both)
+            if n < 2:
+                continue
+            left_out = (both.sum(axis=0) - both) / (n - 1)
+            each = left_out[:, 0] / left_out[:, 1]
+            ratio = both[:, 0].mean() / both[:, 1].mean()
+            se = float(np.sqrt((n - 1) / n * ((each - each.mean()) ** 2).sum()))
+            found.append({"level": level, "method": method, "mean": ratio, "se": se, "n": n})
+    return pd.DataFrame(found, columns=["level", "method", "mean", "se", "n"])

@@ -47,7 +47,12 @@ def draw_sweep(rows: Frame, sweep: Sweep, folder: Path) -> list[Path]:
             for k, varied in enumerate(sweep.vary):
                 chosen = (table["measure"] == measure) & (table["parameter"] == varied.parameter)
                 _draw_response(grid[i][k], table[chosen], varied)
-            grid[i][0].set_ylabel(LABELS.get(measure, measure))
+                if measure in sweep.marks:
+                    grid[i][k].axhline(sweep.marks[measure], color="0.5", lw=1, ls=":")
+            label = LABELS.get(measure, measure)
+            if sweep.against is not None:
+                label = f"{label.split(' [')[0]}: {sweep.against} ÷ method"
+            grid[i][0].set_ylabel(label)
         for k, varied in enumerate(sweep.vary):
             grid[-1][k].set_xlabel(varied.parameter)
         handles, labels = grid[0][0].get_legend_handles_labels()

@@ -143,6 +143,22 @@ def test_one_at_a_time_keeps_the_others_at_base(tmp_path: Path) -> None:
     assert not math.isnan(styles["se"].sum())
 
 
+def test_a_sweep_against_a_method_gives_ratios(tmp_path: Path) -> None:
+    """Blend takes twice as long as policy at every gain; a method that was not run is named."""
+    path = write_sweep(tmp_path)
+    path.write_text(path.read_text() + "\nagainst: blend\nmarks: {time_s: 1.55}\n")
+    sweep = load_sweep(path)
+    rows = run_sweep(sweep, run_study)
+    table = summarise_sweep(rows, sweep)
+    times = table[table["measure"] == "time_s"]
+    assert set(times["method"]) == {"policy"}
+    assert times["mean"].to_numpy() == pytest.approx(2.0)
+    assert times["se"].to_numpy() == pytest.approx(0.0)
+    assert all(path.stat().st_size > 100 for path in draw_sweep(rows, sweep, tmp_path / "out"))
+    with pytest.raises(AnalysisError, match="autonomy.*blend, policy"):
+        summarise_sweep(rows, sweep.model_copy(update={"against": "autonomy"}))
+
+
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
