@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import psutil
 
 from app.bench.served import Served, served
 from app.bench.ticks import read_punctuality
@@ -28,6 +29,8 @@ SIZES = (1, 2, 4, 6, 8, 12)
 SECONDS = 15.0
 SETTLE_S = 3.0
 """After the last visitor has come in, before ticks are counted [s]."""
+FOREIGN_CORES = 0.2
+"""Where other programs use more than this, the measurement says little about the machine."""
 
 
 class CapacityError(AppError):
@@ -49,6 +52,7 @@ class Load:
         viewer_kb_s: What each viewer was sent.
         cores: Cores that server and workers used.
         memory_mb: What server and workers used, for each session.
+        foreign: Cores that other programs used meanwhile.
     """
 
     sessions: int
@@ -61,6 +65,7 @@ class Load:
     viewer_kb_s: float
     cores: float
     memory_mb: float
+    foreign: float = 0.0
 
     def to_figure(self) -> dict[str, Any]:
         """A line of the bench's table."""
@@ -74,6 +79,7 @@ class Load:
             "viewer kB/s": round(self.viewer_kb_s, 1),
             "cores": round(self.cores, 2),
             "MB": round(self.memory_mb, 1),
+            "others": round(self.foreign, 2),
         }
 
 
@@ -104,7 +110,15 @@ def bench_capacity(
 
     loads = search(sizes, measure)
     best = capacity_of(loads)
-    if keep and best:
+    foreign = max(load.foreign for load in loads)
+    if foreign > FOREIGN_CORES:
+        kept = " Nothing is kept." if keep else ""
+        print(
+            f"other programs used up to {foreign:.2f} cores meanwhile: this machine bears more "
+            f"than was measured; end them, and measure again.{kept}",
+            file=sys.stderr,
+        )
+    elif keep and best:
         print(f"kept in {keep_measured(best)}", file=sys.stderr)
     figures = {f"{load.sessions} sessions": load.to_figure() for load in loads}
     return figures | {"capacity": {"sessions": best}}
@@ -137,7 +151,8 @@ def measure_load(sessions: int, seconds: float) -> Load:
     with tempfile.TemporaryDirectory() as folder:
         root = Path(folder)
         with served(root, sessions) as server:
-            begin, end, sent, cores, memory = asyncio.run(_visit(server, sessions, seconds))
+            visit = asyncio.run(_visit(server, sessions, seconds))
+        begin, end = visit.begin_s, visit.end_s
         ticks = read_punctuality(root, begin, end)
     median, p99 = np.percentile(1e3 * ticks.lateness_s, [50, 99]) if ticks.ticks else (0.0, 0.0)
     return Load(
@@ -148,31 +163,51 @@ def measure_load(sessions: int, seconds: float) -> Load:
         told=ticks.told,
         median_ms=float(median),
         p99_ms=float(p99),
-        viewer_kb_s=sent / 1e3 / (end - begin) / sessions,
-        cores=cores,
-        memory_mb=memory / 1e6 / sessions,
+        viewer_kb_s=visit.viewer_bytes / 1e3 / (end - begin) / sessions,
+        cores=visit.cores,
+        memory_mb=visit.memory_bytes / 1e6 / sessions,
+        foreign=visit.foreign,
     )
 
 
-async def _visit(
-    server: Served, sessions: int, seconds: float
-) -> tuple[float, float, int, float, int]:
-    """Begin and end on the monotonic clock [s], bytes sent to viewers, cores, memory [byte]."""
+@dataclass(frozen=True)
+class _Visit:
+    """What was counted from outside: times on the monotonic clock [s], and `Load`'s sums."""
+
+    begin_s: float
+    end_s: float
+    viewer_bytes: int
+    cores: float
+    memory_bytes: int
+    foreign: float
+
+
+async def _visit(server: Served, sessions: int, seconds: float) -> _Visit:
+    """Let so many visitors steer for so long."""
     visitors = [Visitor(server.url) for _ in range(sessions)]
     try:
         for visitor in visitors:
             await visitor.open()
         await asyncio.sleep(SETTLE_S)
         before, sent = server.usage(), sum(visitor.viewer_bytes for visitor in visitors)
+        busy, own = _busy_s(), time.process_time()
         begin = time.monotonic()
         await asyncio.sleep(seconds)
         end = time.monotonic()
+        busy, own = _busy_s() - busy, time.process_time() - own
         sent = sum(visitor.viewer_bytes for visitor in visitors) - sent
         after = server.usage()
         cores = (after.cpu_s - before.cpu_s) / (end - begin)
         for visitor in visitors:
             if visitor.complaint:
                 raise CapacityError(f"a session ended meanwhile: {visitor.complaint}")
-        return begin, end, sent, cores, after.memory_bytes
+        foreign = max(0.0, (busy - own) / (end - begin) - cores)
+        return _Visit(begin, end, sent, cores, after.memory_bytes, foreign)
     finally:
         await asyncio.gather(*(visitor.close() for visitor in visitors))
+
+
+def _busy_s() -> float:
+    """Time that the whole machine's cores have worked so far, all programs together [s]."""
+    times = psutil.cpu_times()
+    return sum(times) - times.idle - getattr(times, "iowait", 0.0) - getattr(times, "guest", 0.0)

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from app.bench import capacity as bench
 from app.web import capacity
 from app.web.capacity import keep_measured, read_measured, rule, usable_cores
 from app.web.config import ServerConfig
@@ -67,3 +68,24 @@ def test_a_server_offers_what_was_measured_unless_told(
     keep_measured(by_rule + 3)
     assert ServerConfig().max_workers == by_rule + 3
     assert ServerConfig(capacity=2).max_workers == 2
+
+
+@pytest.mark.parametrize(("foreign", "kept"), [(0.0, 3), (0.05, 3), (0.9, None)])
+def test_what_other_programs_have_spoiled_is_not_kept(
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    foreign: float,
+    kept: int | None,
+) -> None:
+    """A busy machine bears less than it could: it is said, and servers go on by the rule."""
+
+    def load(sessions: int, seconds: float) -> bench.Load:
+        return bench.Load(sessions, 1.0, 100, 0, 0, 0.1, 1.0, 20.0, 1.0, 50.0, foreign=foreign)
+
+    monkeypatch.setattr(bench, "measure_load", load)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    figures = bench.bench_capacity((1, 3), 1.0, keep=True)
+    assert figures["3 sessions"]["others"] == foreign
+    assert read_measured() == kept
+    assert ("0.90 cores meanwhile" in capsys.readouterr().err) is (kept is None)
