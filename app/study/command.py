@@ -62,13 +62,12 @@ def run(args: argparse.Namespace) -> int:
     if len(targets) != 1:
         raise StudyError(f"study {' '.join(args.words)}: valid is {_USAGE}")
     target = targets[0]
-    if action == "check":
+    if action == "check" and not args.dry_run:
         from app.study.check import check
         from app.study.load import load_study
 
         print(check(load_study(target)))
-        if not args.dry_run:
-            return 0
+        return 0
     if action == "sheet":
         from app.study.load import load_study
         from app.study.sheet import run_sheet
