@@ -1,10 +1,13 @@
 """The server as browsers meet it: whole participations, faults, intruders, the desk."""
 
 import csv
+import io
 import json
 import re
 import threading
 import time
+import urllib.request
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -232,11 +235,37 @@ def test_the_desk(server: StudyServer):
     other.arrive(link.removeprefix("/"))
     assert other.state()["participant"] == own
     assert desk.call("GET", f"/desk/watch/{own}")[0] == 200
+    session = other.state()["trial"]["session"]
+    with other.dial(session) as socket:
+        _started(other, socket)
+        with desk.dial(session) as looker:
+            hello = _next(looker, "hello")
+            assert hello["control"] is False and "methods" not in hello
+            looker.send(json.dumps({"type": "command", "id": 1, "name": "grasp"}))
+            assert "only watches" in _next(looker, "ack")["error"]
     post({"do": "end", "participant": own})
     assert other.state()["page"] == "excluded"
+    request = urllib.request.Request(f"{server.url}/desk/download", headers={"Cookie": desk.cookie})
+    with urllib.request.urlopen(request, timeout=120) as answer:
+        archive = zipfile.ZipFile(io.BytesIO(answer.read()))
+    held = b"".join(archive.read(name) for name in archive.namelist())
+    assert any(
+        name.endswith(f"subject-{own}/session-1/events.jsonl") for name in archive.namelist()
+    )
+    assert b"has a cold" not in held and b"person-desk" not in held
     private = server.sessions / "private" / "paper"
     audit = (private / "audit.jsonl").read_text()
-    for action in ("login failed", "login", "pause", "note", "skip", "link", "watch", "end"):
+    for action in (
+        "login failed",
+        "login",
+        "pause",
+        "note",
+        "skip",
+        "link",
+        "watch",
+        "download",
+        "end",
+    ):
         assert f'"action":"{action}"' in audit
     assert "has a cold" in (private / f"{own}.notes.jsonl").read_text() and "cold" not in audit
     guesser = Visitor(server.url, "guesser")
