@@ -20,7 +20,7 @@ from app.robot.arm import FINGER_NAMES, JOINT_NAMES
 from app.robot.model import build_model
 from app.robot.scene_file import load_scene
 from tests.browser import chromium, open_page
-from tests.review.conftest import Logs, Review, StartReview
+from tests.review.conftest import Logs, Review, StartReview, write_broken
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(600)]
 
@@ -337,6 +337,25 @@ def test_flag_note_filter_and_sort(copied: Logs, review_of: StartReview, browser
         page.locator("#heads button", has_text="Input s").click()
         inputs = [float(rows.nth(i).locator("td").nth(7).inner_text() or "nan") for i in range(3)]
         assert inputs == sorted(inputs, reverse=True)
+
+
+def test_damaged_logs_are_listed_with_what_is_wrong(
+    copied: Logs, review_of: StartReview, browser: Browser
+):
+    """Each row says it in words, opens nothing when clicked, and leaves the others usable."""
+    broken = write_broken(copied)
+    review = review_of(copied.root)
+    with open_page(browser, review.url + "/review" + PLAIN) as page:
+        page.set_default_timeout(WAIT_MS)
+        rows = page.get_by_test_id("trial-row")
+        until(page, lambda: rows.count() == 3 + len(broken))
+        for trial_id, problem in broken.items():
+            row = page.locator(f'[data-testid=trial-row][data-id="{trial_id}"]')
+            assert problem in row.inner_text() and row.get_attribute("aria-disabled") == "true"
+            row.dispatch_event("click")
+            assert problem in page.locator("#messages [role=alert]").inner_text()
+        assert page.evaluate("document.body.dataset.trial ?? ''") == ""
+        open_trial(page, copied.glass)
 
 
 def test_without_the_plotting_library_the_page_says_how_to_get_it(
