@@ -5,7 +5,7 @@ import { s } from "../dom.js";
 const DRAW = {
   sticks: () => [
     stick(90, "up", "down", "", "", 0, -26), word(90, 168, "left stick: height"),
-    stick(330, "away", "near", "left", "right", 12, -28), word(330, 168, "right stick: over the table"),
+    stick(330, "away", "near", "left", "right", 10, -22), word(330, 168, "right stick: over the table"),
   ],
   target: () => [
     s("path", { d: "M90 112 L330 112 L380 150 L40 150 Z", class: "table" }),

@@ -122,7 +122,7 @@ export function createStage(page) {
     const yaw = viewer.yaw();
     if (yaw !== null && yaw !== store.state.yaw) store.update({ yaw, viewYaw: yaw });
     setAttribute(byId("compass"), "data-yaw", store.state.yaw);
-    task.render(due);
+    task.render(due, refusal !== "" && !store.state.hello);
     sticks.render();
     setHidden(byId("grasp-column"), due?.part === "free");
     setAttribute(byId("grasp"), "aria-disabled", trial()?.phase !== "running" || store.state.hello?.control !== true);

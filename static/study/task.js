@@ -20,13 +20,16 @@ export function createTask(store) {
   };
 
   return {
-    /** @param {any} due the trial as the server describes it */
-    render(due) {
+    /**
+     * @param {any} due the trial as the server describes it
+     * @param {boolean} queued whether the page waits for a free robot
+     */
+    render(due, queued) {
       const { connection, hello, status } = store.state;
-      const state = connection.state === "connected" ? "connected" : connection.state;
+      const state = queued ? "reconnecting" : connection.state;
       setAttribute(link, "data-state", state);
       document.body.dataset.connection = state;
-      setText(link.querySelector(".word"), state === "connected" ? "Connected" : connection.before ? "Reconnecting" : "Connecting");
+      setText(link.querySelector(".word"), queued ? "Waiting" : state === "connected" ? "Connected" : connection.before ? "Reconnecting" : "Connecting");
       if (!due) return;
       const free = due.part === "free";
       const trial = status?.trial;

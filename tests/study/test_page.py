@@ -13,6 +13,7 @@ from tests.study.person import go_on, step_of, take_part
 from tests.study.server import StudyServer
 from tests.study.traffic import Traffic
 
+FOCUSED = "() => document.activeElement.name || document.activeElement.dataset.testid"
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(900)]
 
 
@@ -82,6 +83,11 @@ def test_pages_keep_what_was_answered_and_take_only_what_is_complete(server: Stu
             agree.check()
             go_on(page)
             assert page.locator("input:checked").count() == 0
+            reached = []
+            for _ in range(4):
+                page.keyboard.press("Tab")
+                reached.append(page.evaluate(FOCUSED))
+            assert reached == ["gender", "experience", "prior_exposure", "continue"]
             with page.expect_response("**/api/study"):
                 page.locator('input[name="gender"][value="other"]').check()
             page.get_by_test_id("continue").dispatch_event("click")
@@ -123,7 +129,10 @@ def test_who_comes_when_all_places_are_taken_waits_kindly_and_gets_in(tmp_path: 
                     "() => document.querySelector('#say .card b')?.textContent.includes('wait')",
                     timeout=60_000,
                 )
-                assert "goes on by itself" in (card.text_content() or "")
+                said = card.text_content() or ""
+                assert "All robots are in use" in said and "goes on by itself" in said
+                link = page.get_by_test_id("connection")
+                assert link.get_attribute("data-state") == "reconnecting"
                 assert step_of(page) == "training"
                 first.want(do="withdraw")
                 page.wait_for_function(

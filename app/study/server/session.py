@@ -34,6 +34,8 @@ LOG_PATIENCE_S = 20.0
 RESULT_S = 2.0
 """How long a person reads how the trial ended before the next one is set up."""
 
+ALL_TAKEN = "All robots are in use just now. It is your turn as soon as one of them is free."
+
 logger = logging.getLogger("hindsight.study")
 
 
@@ -100,6 +102,9 @@ class StudySession(Session):
         task = person.state.task
         if task is None:
             raise StartRefusedError("There is no trial to be done now.")
+        registry = self._host.registry
+        if registry is not None and registry.workers.full:
+            raise StartRefusedError(ALL_TAKEN)
         self._key = worker_key(task)
         self._log, self._moving, self._over = 0, False, False
         self._past = max((a.started.trial for a in person.state.attempts), default=0)
