@@ -114,6 +114,7 @@ def compare_methods(trials: Frame, measure: str, contrast: tuple[str, str]) -> M
         and 2 * len(complete.participants) >= len(means)
     ):
         anova = two_way(cells)
+        _, means = complete.balanced_means()  # the effect is of those whom the test is of
     else:
         anova = one_way(cells)
         note = (
