@@ -3,7 +3,7 @@
 
 A hard edge catches no light and makes a part look like a diagram; a fillet of 4 mm gives it the
 highlight that a real housing has. Normals are those of the surface itself, so curves stay smooth
-at 64 segments and flat faces stay flat.
+at 40 segments and flat faces stay flat.
 """
 
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 FILLET_M = 0.004  # [m]
-SEGMENTS = 64
+SEGMENTS = 40
 ARC_STEPS = 3  # facets of a fillet
 
 F32 = npt.NDArray[np.float32]
