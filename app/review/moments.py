@@ -12,6 +12,7 @@ LEAD_S = 0.2
 _PLAIN = {
     "open": "hand opens",
     "blur": "window left",
+    "handover": "a visitor takes over",
     "hidden": "page hidden",
     "disconnect": "connection drops",
     "reconnect": "connection back",

@@ -134,7 +134,7 @@ export function createStage(page) {
     const { connection, hello } = store.state;
     if (refusal && !hello) return ["info", "Please wait a moment", `${sentence(refusal)} This page goes on by itself.`, []];
     if (connection.state === "lost") return ["warn", "The robot is not there just now", connection.reason || "This page tries again by itself.", [again]];
-    if (connection.state !== "connected") return connection.before ? ["warn", "Connection lost. The robot has stopped.", "This trial will be repeated.", []] : ["info", "Getting the robot ready …", "", []];
+    if (connection.state !== "connected") return connection.before ? ["warn", "Connection lost.", "This trial will be repeated.", []] : ["info", "Getting the robot ready …", "", []];
     if (hello?.control === false) return ["info", "This study is open in another tab", "Please go on there. This tab takes over when the other one is closed.", []];
     const now = trial();
     if (!now || !due) return ["info", "Getting the robot ready …", "", []];
