@@ -43,8 +43,7 @@ METHOD_DEFAULTS: dict[str, dict[str, Any]] = {
         "w_l": 80.0,
         "translation_offset": 1.5,
         "step": "exact",
-        "beta": 48.0,
-        "idle_drift": 2.0,
+        "idle_drift": 1.0,
     },
 }
 
