@@ -31,16 +31,14 @@ plots: $(STAMP)  ## fetch the review page's plotting library again (needs the ne
 browser: $(STAMP)  ## find or install a Chromium for the browser tests
 	@$(BIN)/python tests/find_browser.py
 
-# A browser that draws with software GL needs both cores to itself: those tests run one by one. The
-# page's own tests draw nothing.
+# A browser with software GL needs both cores to itself: those tests run one by one.
 test: $(STAMP) browser  ## all tests but the slow ones, at most 8 minutes on two cores
 	$(PYTEST) -m "not slow and not browser"
-	$(PYTEST) -m "not slow" tests/page
-	$(BIN)/pytest -m "browser and not slow" --ignore tests/page
+	$(BIN)/pytest -m "browser and not slow"
 
 test-all: $(STAMP) browser  ## what `make test` leaves out, at most 30 minutes on two cores
 	$(PYTEST) -m "slow and not browser"
-	$(BIN)/pytest -m "slow and browser" || test $$? -eq 5  # 5: there is none
+	$(BIN)/pytest -m "slow and browser"
 
 check: $(STAMP)  ## style and types
 	$(BIN)/ruff check .

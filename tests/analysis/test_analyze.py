@@ -160,6 +160,7 @@ def test_all_failed_gives_a_report_that_says_so(tmp_path: Path) -> None:
     assert results_of(report)["hypotheses"] is None
 
 
+@pytest.mark.slow
 def test_a_torn_folder_loses_only_what_is_torn(tmp_path: Path) -> None:
     """A line cut off, a log cut off, no participants: each said, the rest analysed."""
     folder = make_study(tmp_path, n=6, logs=2)

@@ -59,6 +59,7 @@ def test_a_gamepad_grasps(server: Server, browser: Browser):
         assert page.get_by_test_id("input-device").get_attribute("data-device") == "gamepad"
 
 
+@pytest.mark.slow
 def test_the_keyboard_grasps(server: Server, browser: Browser):
     """WASD, R/F and space do it too."""
     with open_page(browser, f"{server.url}/?method=policy&target=block&seed=6") as page:

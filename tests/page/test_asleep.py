@@ -5,7 +5,7 @@ import pytest
 from tests.page.conftest import OpenPage, newest_axes
 from tests.page.fake_server import FakeServer
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(600)]
+pytestmark = [pytest.mark.browser, pytest.mark.slow, pytest.mark.timeout(600)]
 CONNECTED = '[data-testid="connection"][data-state="connected"]'
 
 
@@ -56,7 +56,6 @@ def test_a_page_that_slept_past_its_session_is_told(fake: FakeServer, open_page:
     told.wait_for()
 
 
-@pytest.mark.slow
 def test_fifty_reconnects_leave_one_line_and_no_litter(
     fake: FakeServer, open_page: OpenPage
 ) -> None:

@@ -9,7 +9,7 @@ from playwright.sync_api import Page
 from tests.page.conftest import OpenPage, newest_axes
 from tests.page.fake_server import FakeServer
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 
 def knob(page: Page, side: str) -> tuple[float, float]:

@@ -8,7 +8,7 @@ from tests.page.conftest import OpenPage
 from tests.page.fake_server import FakeServer
 from tests.page.test_layout import PORTRAIT, STATES, put_into
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 DESK, PHONE = (1440, 900), (844, 390)
 SERIOUS = ("serious", "critical")

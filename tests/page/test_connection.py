@@ -5,7 +5,7 @@ import pytest
 from tests.page.conftest import OpenPage, newest_axes
 from tests.page.fake_server import FakeServer
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 PUSH = "pointer('right', 'pointerdown', 0, 0); pointer('right', 'pointermove', 1, 0)"
 

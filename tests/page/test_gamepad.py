@@ -8,7 +8,7 @@ from playwright.sync_api import expect
 from tests.page.conftest import OpenPage, newest_axes
 from tests.page.fake_server import FakeServer
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 PADS = """
 window.pads = [null];

@@ -8,7 +8,7 @@ from playwright.sync_api import Page, expect
 from tests.page.conftest import OpenPage
 from tests.page.fake_server import FakeServer
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 SIZES = [(1440, 900), (1920, 1080), (1366, 768), (1100, 800), (1024, 768), (844, 390), (667, 375)]
 PORTRAIT = (390, 844)

@@ -42,7 +42,7 @@ def test_every_name_that_drivers_rely_on_is_there_once(open_page: OpenPage):
 
 def test_the_figures_of_the_status_reach_the_document(fake: FakeServer, open_page: OpenPage):
     """Trial, beliefs and positions, as numbers in attributes."""
-    page = open_page()
+    page = open_page("?detail=full")
     trial = page.get_by_test_id("trial")
     expect(trial).to_have_attribute("data-target", "glass")
     expect(trial).to_have_attribute("data-outcome", "running")

@@ -10,7 +10,7 @@ from playwright.sync_api import expect
 from tests.page.conftest import OpenPage, newest_axes
 from tests.page.fake_server import FakeServer
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 
 def test_a_push_is_sent_in_units_of_the_knobs_travel(fake: FakeServer, open_page: OpenPage):

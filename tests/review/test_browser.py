@@ -104,6 +104,7 @@ def logged_bodies(record: StepRecord) -> dict[str, np.ndarray]:
     return {model.body(i).name: data.xpos[i].copy() for i in range(model.nbody)}
 
 
+@pytest.mark.slow
 def test_a_scrubbed_moment_is_the_logs(page: Page, logs: Logs):
     """Timeline, clock and picture stand at the same step; the arm is where it was, to 1e-3 m."""
     open_trial(page, logs.glass)
@@ -174,6 +175,7 @@ def test_a_trial_plays_pauses_and_jumps(page: Page, logs: Logs):
     assert timeline.get_attribute("data-step") == str(last)
 
 
+@pytest.mark.slow
 def test_a_click_into_a_curve_goes_there(page: Page, logs: Logs):
     """The plots seek on click, zoom by drag, and come back on a double click."""
     open_trial(page, logs.glass)
@@ -203,6 +205,7 @@ def click_middle(page: Page) -> int:
     return int(page.get_by_test_id("timeline").get_attribute("data-step") or 0)
 
 
+@pytest.mark.slow
 def test_what_would_have_been(page: Page, logs: Logs):
     """Another method is drawn against what was done; from a moment on it says its caveat."""
     open_trial(page, logs.block)
@@ -225,6 +228,7 @@ def test_what_would_have_been(page: Page, logs: Logs):
     assert "a person would have reacted" in answer and "leaves the log" not in answer
 
 
+@pytest.mark.slow
 def test_trials_side_by_side(page: Page, logs: Logs):
     """Two trials move together: by time, by an event, by the distance to the goal."""
     for trial_id in (logs.glass, logs.block):
@@ -261,6 +265,7 @@ def nearest_so_far(replay: Replay) -> np.ndarray:
     return np.minimum.accumulate(distances_to_goals(replay)[:, goal])
 
 
+@pytest.mark.slow
 def test_a_trial_is_shared(page: Page, logs: Logs, browser: Browser, tmp_path: Path):
     """One HTML file that plays from disk, a PNG, and a link that leads to the same moment."""
     open_trial(page, logs.glass)
@@ -292,6 +297,7 @@ def test_a_trial_is_shared(page: Page, logs: Logs, browser: Browser, tmp_path: P
         )
 
 
+@pytest.mark.slow
 def test_a_film_is_recorded(page: Page, logs: Logs, tmp_path: Path):
     """WebM of the view while the trial plays to its end."""
     open_trial(page, logs.glass)
@@ -339,6 +345,7 @@ def test_flag_note_filter_and_sort(copied: Logs, review_of: StartReview, browser
         assert inputs == sorted(inputs, reverse=True)
 
 
+@pytest.mark.slow
 def test_damaged_logs_are_listed_with_what_is_wrong(
     copied: Logs, review_of: StartReview, browser: Browser
 ):
@@ -358,6 +365,7 @@ def test_damaged_logs_are_listed_with_what_is_wrong(
         open_trial(page, copied.glass)
 
 
+@pytest.mark.slow
 def test_without_the_plotting_library_the_page_says_how_to_get_it(
     logs: Logs, browser: Browser, review: Review
 ):

@@ -106,6 +106,7 @@ def test_pages_keep_what_was_answered_and_take_only_what_is_complete(server: Stu
             page.wait_for_selector('[data-step="withdrawn"]')
 
 
+@pytest.mark.slow
 def test_who_comes_when_all_places_are_taken_waits_kindly_and_gets_in(tmp_path: Path):
     """One place: the page says so in words, and the robot appears when the other one leaves."""
     running = StudyServer(tmp_path, options=("--test-run", "--capacity", "1"))

@@ -36,6 +36,7 @@ def table(server: StudyServer, what: str) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
+@pytest.mark.slow
 def test_whole_participations_in_both_orders_never_name_a_method(server: StudyServer):
     """Two side by side, from link to code; tables right to the row; blind to the last byte."""
     people = [visitor(server, name, keep=True) for name in ("a", "b")]
