@@ -154,6 +154,7 @@ def test_a_place_out_of_reach_is_named(scene: Scene) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(1200)
 @pytest.mark.parametrize("name", ["default", "in-line", "clutter"])
 def test_every_target_at_every_place_succeeds_in_physics(name: str) -> None:
     """Approach along the last 10 cm, close, lift: grasped, without exception."""
