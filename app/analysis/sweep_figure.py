@@ -81,6 +81,6 @@ def _draw_response(axes: Axes, table: Frame, varied: Varied) -> None:
             label=method,
         )
     if words:
-        axes.set_xticks(range(len(levels)), [str(v) for v in levels])
+        axes.set_xticks(range(len(levels)), [str(v) for v in levels], rotation=20)
     elif varied.scale == "log":
         axes.set_xscale("log")
