@@ -91,6 +91,8 @@ def open_page(fake: FakeServer, browser: Browser) -> Iterator[OpenPage]:
     yield open_it
     for context in contexts:
         context.close()
+    # What a closed page had still on its way must not count for the next test.
+    fake.wait(lambda: fake.pages == 0, "its sockets are gone")
     assert not errors, f"the page threw: {errors}"
 
 
