@@ -16,7 +16,7 @@ from app.recording.listing import entry_of
 from app.recording.numbering import trial_name
 from app.session.session import SERVER
 from app.session.spec import WorkerSpec
-from app.study.errors import StudyError
+from app.study.errors import ProtocolError, StudyError
 from app.study.events import AttemptEnded, AttemptStarted
 from app.study.plan import Task
 from app.study.server.spec import trial_command, worker_key, worker_spec
@@ -161,10 +161,8 @@ class StudySession(Session):
 
     async def interrupt(self, reason: str) -> None:
         """Another's doing: the running attempt does not count, and the worker ends."""
-        running = self.person.state.running
         self.drop_trial()
-        if running is not None:
-            await self._host.happen(self.participant, ended(running.started, "interrupted", reason))
+        await self._end_running(reason)
 
     def tell(self, **fields: Any) -> None:
         """Say something to all pages of this participant."""
@@ -226,10 +224,22 @@ class StudySession(Session):
         running = self.person.state.running
         if running is None or running.started.trial != log:
             return
-        await self._host.happen(self.participant, ended(running.started, "interrupted", reason))
+        await self._end_running(reason)
         logger.info("%s: trial %d was interrupted: %s", self.participant, log, reason)
         self.tell(event="changed")
         self._next(log)
+
+    async def _end_running(self, reason: str) -> None:
+        """End the running attempt, unless another (a dropped line, the desk) has just done so."""
+        running = self.person.state.running
+        if running is None:
+            return
+        event = ended(running.started, "interrupted", reason)
+        try:
+            await self._host.happen(self.participant, event)
+        except ProtocolError:
+            if self.person.state.running is running:
+                raise
 
     async def _finish(self, number: int) -> None:
         """Wait for the log, note the outcome it holds, and set up what comes next."""
