@@ -44,14 +44,8 @@ class Backend(Protocol):
         """Evaluate and condition the belief."""
         ...
 
-    def descend(
-        self,
-        settings: AssistanceSettings,
-        towards: Array,
-        offsets: Rows,
-        rotation_values: Array,
-        belief: Array,
-        starts: Array,
+    def exact_step(
+        self, settings: AssistanceSettings, goals: Goals, x: Array, belief: Array, gradient: Array
     ) -> Array:
         """Minimise the policy's objective over the translation."""
         ...

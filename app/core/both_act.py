@@ -19,10 +19,11 @@ from functools import lru_cache
 
 import numpy as np
 
+from app.core.rotations import approach_axes
 from app.core.settings import AssistanceSettings
 from app.core.situation import Situation
 from app.core.types import Array
-from app.core.values import cost_rate, translation_cost
+from app.core.values import cost_rate, translation_cost, weigh
 
 SAMPLES = 64
 STEP = 0.04  # [s]
@@ -41,11 +42,13 @@ def both_act_step(situation: Situation) -> Array:
     distances, values = both_act_values(settings)
     slopes = np.diff(values) / np.diff(distances)
     y = x[:3] + settings.look_ahead * x[7:10]
-    toward = situation.goals.positions[situation.best_targets] - y
-    d = np.linalg.norm(toward, axis=1)
+    best, aside = situation.best_targets, settings.translation_aside
+    axes = approach_axes(situation.goals.quaternions[best])
+    weighed = weigh(situation.goals.positions[best] - y, axes, aside)
+    d, toward = np.linalg.norm(weighed, axis=1), weigh(weighed, axes, aside)
     middles = 0.5 * (distances[1:] + distances[:-1])
     speed = np.interp(d, middles, slopes) / (2.0 * settings.w_translation)
-    speed = np.minimum(speed, d / settings.look_ahead)
+    speed = np.minimum(speed, d / (aside**2 * settings.look_ahead))
     unit = toward / np.where(d > 0.0, d, np.inf)[:, None]
     return (situation.belief * speed) @ unit
 

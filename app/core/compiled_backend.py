@@ -6,13 +6,13 @@ a fraction of one from the cache).
 
 import numpy as np
 
-from app.core import exact_kernel, kernels
+from app.core import kernels
 from app.core.belief import Evidence
-from app.core.exact import PASSES, TOLERANCE
+from app.core.rotations import approach_axes
 from app.core.settings import AssistanceSettings
 from app.core.types import Array, Goals, Rows
 
-__all__ = ["NAME", "descend", "evaluate", "fill_grid", "update"]
+__all__ = ["NAME", "evaluate", "exact_step", "fill_grid", "update"]
 
 NAME: str = "compiled"
 
@@ -93,6 +93,7 @@ def fill_grid(
     kernels.fill_grid(
         settings.packed,
         own.positions,
+        approach_axes(own.quaternions),
         own.offsets,
         rotation_values,
         weights,
@@ -105,28 +106,28 @@ def fill_grid(
     )
 
 
-def descend(
-    settings: AssistanceSettings,
-    towards: Array,
-    offsets: Rows,
-    rotation_values: Array,
-    belief: Array,
-    starts: Array,
+def exact_step(
+    settings: AssistanceSettings, goals: Goals, x: Array, belief: Array, gradient: Array
 ) -> Array:
-    """`exact.descend`."""
+    """`exact.exact_step`."""
     best = np.empty(3)
-    exact_kernel.descend(
-        settings.packed,
-        np.ascontiguousarray(towards),
-        np.array(offsets, dtype=np.int64),
-        rotation_values,
-        np.array(belief),
-        settings.w_translation,
-        PASSES,
-        TOLERANCE,
-        starts,
-        best,
-    )
+    try:
+        kernels.exact_step(
+            settings.packed,
+            goals.positions,
+            goals.quaternions,
+            goals.offsets,
+            x,
+            belief,
+            gradient,
+            settings.w_translation,
+            np.empty((goals.n_targets, 8)),
+            np.empty((kernels.STARTS, 3)),
+            best,
+        )
+    except TypeError:
+        arrays = (np.array(one, dtype=np.float64) for one in (x, belief, gradient))
+        return exact_step(settings, _contiguous(goals), *arrays)
     return best
 
 

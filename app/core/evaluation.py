@@ -7,10 +7,10 @@ paper's Theorem 1), for assistance; the soft-min over targets (Theorem 2) for pr
 
 import numpy as np
 
-from app.core.rotations import from_rotation_vector, multiply, rotation_between
+from app.core.rotations import approach_axes, from_rotation_vector, multiply, rotation_between
 from app.core.settings import AssistanceSettings
 from app.core.types import Array, Goals, Rows
-from app.core.values import cost_rate, rotation_cost, slope, translation_cost, value
+from app.core.values import cost_rate, rotation_cost, slope, translation_cost, value, weigh
 
 # Rows of an evaluation, one column a goal.
 VALUE = 0  # V_g(x) [nat]
@@ -64,12 +64,14 @@ def evaluate(
     offsets, starts = goals.offsets, goals.offsets[:-1]
     quaternion = x[3:7] / np.sqrt(x[3:7] @ x[3:7])
 
-    distance = np.sqrt(((goals.positions - x[:3]) ** 2).sum(axis=1))
+    axes, aside = approach_axes(goals.quaternions), settings.translation_aside
+    way = goals.positions - x[:3]
+    distance = np.sqrt((weigh(way, axes, aside) ** 2).sum(axis=1))
     angle, axis_after = rotation_between(goals.quaternions, quaternion)
     before = value(distance, translation) + weight * value(angle, rotation)
 
-    offset_after = x[:3] + tau * x[7:10] - goals.positions
-    distance_after = np.sqrt((offset_after**2).sum(axis=1))
+    weighed_after = weigh(x[:3] + tau * x[7:10] - goals.positions, axes, aside)
+    distance_after = np.sqrt((weighed_after**2).sum(axis=1))
     angle_after = angle
     if x[10:].any():
         turned = multiply(from_rotation_vector(tau * x[10:]), quaternion)
@@ -82,7 +84,7 @@ def evaluate(
     best_targets[:] = best
     rows[VALUE] = least
     rows[Q_VALUE] = tau * rates[best] + least_after
-    rows[DISTANCE] = np.minimum.reduceat(distance, starts)
+    rows[DISTANCE] = np.minimum.reduceat(np.sqrt((way**2).sum(axis=1)), starts)
     rows[COST] = rates[first_min(before, least, offsets)]
     rows[SOFT_BEFORE] = soft_min(before, offsets, settings.temperature)
     if settings.predictor == "paper" and settings.temperature == 0.0:
@@ -92,7 +94,8 @@ def evaluate(
         rows[SOFT_AFTER] = soft_min(after + running, offsets, settings.temperature)
 
     d, r, n = distance_after[best], angle_after[best], axis_after[best]
-    rows[GRADIENT : GRADIENT + 3] = _along(offset_after[best], d, slope(d, translation)).T
+    downhill = weigh(weighed_after[best], axes[best], aside)  # ∇(|L e|²/2) = L L e
+    rows[GRADIENT : GRADIENT + 3] = _along(downhill, d, slope(d, translation)).T
     sine = np.sqrt((n**2).sum(axis=1))
     rows[GRADIENT + 3 : GRADIENT + 6] = _along(-n, sine, weight * slope(r, rotation)).T
 

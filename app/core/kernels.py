@@ -12,8 +12,13 @@ from typing import Any
 
 import numba
 from numba import float64, int64
+from numba.types import UniTuple
 
 _VECTOR, _MATRIX, _ROWS = float64[::1], float64[:, ::1], int64[::1]
+# As in exact.py; not imported, since the cache would not see them change.
+PASSES, COARSE, TOLERANCE = 200, 1e-6, 1e-14
+RESTART_GOALS, RESTART_TARGETS, SHORT_OF_TARGET = 4, 3, 0.9
+STARTS = 2 + RESTART_GOALS * RESTART_TARGETS
 _SOFT_MIN_REACH = 40.0  # exp(−40) of a term is below the rounding of the sum
 
 
@@ -64,6 +69,33 @@ def angle_to(quaternions, k, w, x, y, z):
     return angle(cosine, math.sqrt(nx * nx + ny * ny + nz * nz))
 
 
+@compile_kernel(float64(_MATRIX, int64, float64, float64, float64))
+def along_approach(quaternions, k, ex, ey, ez):
+    """Return e · z of target k, `rotations.approach_axes`."""
+    w, x, y, z = quaternions[k, 0], quaternions[k, 1], quaternions[k, 2], quaternions[k, 3]
+    along = 2.0 * (ex * (x * z + w * y) + ey * (y * z - w * x))
+    return along + ez * (1.0 - 2.0 * (x * x + y * y))
+
+
+@compile_kernel(UniTuple(float64, 4)(_VECTOR, float64))
+def turned(x, tau):
+    """Return the unit quaternion exp(τ[ω]×) R of a row (position, quaternion, twist)."""
+    norm = math.sqrt(x[3] * x[3] + x[4] * x[4] + x[5] * x[5] + x[6] * x[6])
+    qw, qx, qy, qz = x[3] / norm, x[4] / norm, x[5] / norm, x[6] / norm
+    rx, ry, rz = tau * x[10], tau * x[11], tau * x[12]
+    if rx == 0.0 and ry == 0.0 and rz == 0.0:
+        return qw, qx, qy, qz
+    turn = math.sqrt(rx * rx + ry * ry + rz * rz)
+    s = 0.5 - turn * turn / 48.0 if turn < 1e-4 else math.sin(0.5 * turn) / turn
+    ew, ex, ey, ez = math.cos(0.5 * turn), s * rx, s * ry, s * rz
+    return (
+        ew * qw - ex * qx - ey * qy - ez * qz,
+        ew * qx + ex * qw + ey * qz - ez * qy,
+        ew * qy - ex * qz + ey * qw + ez * qx,
+        ew * qz + ex * qy - ey * qx + ez * qw,
+    )
+
+
 @compile_kernel(numba.boolean(_VECTOR, _MATRIX, _MATRIX, _ROWS, _VECTOR, _MATRIX, _ROWS))
 def evaluate(packed, positions, quaternions, offsets, x, rows, best_targets):
     """Fill rows 0…11 and the best targets, `evaluation.evaluate`; False where input is not valid.
@@ -73,6 +105,8 @@ def evaluate(packed, positions, quaternions, offsets, x, rows, best_targets):
     a_t, d_t, c_t, v_t = packed[0], packed[1], packed[2], packed[3]
     a_r, d_r, c_r, v_r, m = packed[4], packed[5], packed[6], packed[7], packed[8]
     tau, temperature, with_running = packed[9], packed[10], packed[11] == 1.0
+    aside2 = packed[15] * packed[15]
+    straight = aside2 == 1.0
     n_goals = offsets.shape[0] - 1
     if n_goals < 1 or n_goals != best_targets.shape[0] or n_goals != rows.shape[1]:
         return False
@@ -89,22 +123,12 @@ def evaluate(packed, positions, quaternions, offsets, x, rows, best_targets):
         total += x[i]
     if not (norm2 > 1e-12 and math.isfinite(total)):
         return False
-    norm = math.sqrt(norm2)
-    qw, qx, qy, qz = x[3] / norm, x[4] / norm, x[5] / norm, x[6] / norm
     px, py, pz = x[0], x[1], x[2]
     # x ⊕ τD(u)
     ax, ay, az = px + tau * x[7], py + tau * x[8], pz + tau * x[9]
-    rx, ry, rz = tau * x[10], tau * x[11], tau * x[12]
-    rotates = rx != 0.0 or ry != 0.0 or rz != 0.0
-    tw, tx, ty, tz = qw, qx, qy, qz
-    if rotates:
-        turn = math.sqrt(rx * rx + ry * ry + rz * rz)
-        s = 0.5 - turn * turn / 48.0 if turn < 1e-4 else math.sin(0.5 * turn) / turn
-        ew, ex, ey, ez = math.cos(0.5 * turn), s * rx, s * ry, s * rz
-        tw = ew * qw - ex * qx - ey * qy - ez * qz
-        tx = ew * qx + ex * qw + ey * qz - ez * qy
-        ty = ew * qy - ex * qz + ey * qw + ez * qx
-        tz = ew * qz + ex * qy - ey * qx + ez * qw
+    rotates = x[10] != 0.0 or x[11] != 0.0 or x[12] != 0.0
+    qw, qx, qy, qz = turned(x, 0.0)
+    tw, tx, ty, tz = turned(x, tau)
 
     for g in range(n_goals):
         first, end = offsets[g], offsets[g + 1]
@@ -116,9 +140,17 @@ def evaluate(packed, positions, quaternions, offsets, x, rows, best_targets):
         best = first
         for k in range(first, end):
             ex, ey, ez = positions[k, 0] - px, positions[k, 1] - py, positions[k, 2] - pz
-            d = math.sqrt(ex * ex + ey * ey + ez * ez)
-            ex, ey, ez = ax - positions[k, 0], ay - positions[k, 1], az - positions[k, 2]
-            d_after = math.sqrt(ex * ex + ey * ey + ez * ez)
+            square = ex * ex + ey * ey + ez * ez
+            distance = math.sqrt(square)
+            fx, fy, fz = ax - positions[k, 0], ay - positions[k, 1], az - positions[k, 2]
+            if straight:
+                d, d_after = distance, math.sqrt(fx * fx + fy * fy + fz * fz)
+            else:  # |L e|² = a² |e|² + (1 − a²) (e · z)²
+                along = along_approach(quaternions, k, ex, ey, ez)
+                d = math.sqrt(aside2 * square + (1.0 - aside2) * along * along)
+                along = along_approach(quaternions, k, fx, fy, fz)
+                square = fx * fx + fy * fy + fz * fz
+                d_after = math.sqrt(aside2 * square + (1.0 - aside2) * along * along)
             r = angle_to(quaternions, k, qw, qx, qy, qz)
             v_rotation = m * value(r, a_r, d_r, c_r, v_r)
             before = value(d, a_t, d_t, c_t, v_t) + v_rotation
@@ -138,8 +170,7 @@ def evaluate(packed, positions, quaternions, offsets, x, rows, best_targets):
                     sum_after = sum_after * math.exp((summed - least_summed) / temperature) + 1.0
                 elif summed - least_summed < _SOFT_MIN_REACH * temperature:
                     sum_after += math.exp((least_summed - summed) / temperature)
-            if d < nearest:
-                nearest = d
+            nearest = min(nearest, distance)
             if summed < least_summed:
                 least_summed = summed
             if before < least:
@@ -162,11 +193,19 @@ def evaluate(packed, positions, quaternions, offsets, x, rows, best_targets):
 
         # ∇V at the best target after the action
         ex, ey, ez = ax - positions[best, 0], ay - positions[best, 1], az - positions[best, 2]
-        d = math.sqrt(ex * ex + ey * ey + ez * ez)
-        scale = cost_rate(d, a_t, d_t, c_t) / (v_t * d) if d > 0.0 else 0.0
-        rows[6, g], rows[7, g], rows[8, g] = ex * scale, ey * scale, ez * scale
+        square = ex * ex + ey * ey + ez * ez
         kw, kx = quaternions[best, 0], quaternions[best, 1]
         ky, kz = quaternions[best, 2], quaternions[best, 3]
+        if not straight:
+            along = along_approach(quaternions, best, ex, ey, ez)
+            square = aside2 * square + (1.0 - aside2) * along * along
+            along *= 1.0 - aside2
+            ex = aside2 * ex + along * 2.0 * (kx * kz + kw * ky)
+            ey = aside2 * ey + along * 2.0 * (ky * kz - kw * kx)
+            ez = aside2 * ez + along * (1.0 - 2.0 * (kx * kx + ky * ky))
+        d = math.sqrt(square)
+        scale = cost_rate(d, a_t, d_t, c_t) / (v_t * d) if d > 0.0 else 0.0
+        rows[6, g], rows[7, g], rows[8, g] = ex * scale, ey * scale, ez * scale
         scalar = kw * tw + kx * tx + ky * ty + kz * tz
         nx = tw * kx - kw * tx - (ky * tz - kz * ty)
         ny = tw * ky - kw * ty - (kz * tx - kx * tz)
@@ -292,13 +331,14 @@ def update(
 
 @compile_kernel(
     numba.void(
-        *(_VECTOR, _MATRIX, _ROWS, _VECTOR, _VECTOR, _VECTOR),
+        *(_VECTOR, _MATRIX, _MATRIX, _ROWS, _VECTOR, _VECTOR, _VECTOR),
         *(_VECTOR, _VECTOR, float64, _MATRIX, _MATRIX),
     )
 )
 def fill_grid(
     packed,
     positions,
+    axes,
     offsets,
     rotation_values,
     weights,
@@ -315,6 +355,7 @@ def fill_grid(
     `scratch`: least value and sum of exponentials per point of a row, shape (2, n_v).
     """
     alpha, delta, offset, speed = packed[0], packed[1], packed[2], packed[3]
+    aside2 = packed[15] * packed[15]
     n_u, n_v = grid.shape
     least, total = scratch[0], scratch[1]
     step = 1.0 / (n_v - 1)
@@ -329,11 +370,14 @@ def fill_grid(
                 rx = start[0] + s * u[0] - positions[k, 0]
                 ry = start[1] + s * u[1] - positions[k, 1]
                 rz = start[2] + s * u[2] - positions[k, 2]
+                zx, zy, zz = axes[k, 0], axes[k, 1], axes[k, 2]
                 rotation_value = rotation_values[k]
                 for j in range(n_v):
                     t = j * step
                     ex, ey, ez = rx + t * v[0], ry + t * v[1], rz + t * v[2]
-                    d = math.sqrt(ex * ex + ey * ey + ez * ez)
+                    along = ex * zx + ey * zy + ez * zz
+                    square = aside2 * (ex * ex + ey * ey + ez * ez)
+                    d = math.sqrt(square + (1.0 - aside2) * along * along)
                     one = value(d, alpha, delta, offset, speed) + rotation_value
                     least[j] = one if one < least[j] else least[j]
             if temperature > 0.0:
@@ -342,13 +386,132 @@ def fill_grid(
                     rx = start[0] + s * u[0] - positions[k, 0]
                     ry = start[1] + s * u[1] - positions[k, 1]
                     rz = start[2] + s * u[2] - positions[k, 2]
+                    zx, zy, zz = axes[k, 0], axes[k, 1], axes[k, 2]
                     for j in range(n_v):
                         t = j * step
                         ex, ey, ez = rx + t * v[0], ry + t * v[1], rz + t * v[2]
-                        d = math.sqrt(ex * ex + ey * ey + ez * ez)
+                        along = ex * zx + ey * zy + ez * zz
+                        square = aside2 * (ex * ex + ey * ey + ez * ez)
+                        d = math.sqrt(square + (1.0 - aside2) * along * along)
                         one = value(d, alpha, delta, offset, speed) + rotation_values[k]
                         total[j] += math.exp((least[j] - one) / temperature)
                 for j in range(n_v):
                     least[j] -= temperature * math.log(total[j])
             for j in range(n_v):
                 grid[i, j] += weights[g] * least[j]
+
+
+@compile_kernel(
+    float64(
+        *(_VECTOR, _MATRIX, _MATRIX, _ROWS, _VECTOR, _VECTOR, _VECTOR),
+        *(float64, _MATRIX, _MATRIX, _VECTOR),
+    )
+)
+def exact_step(
+    packed, positions, quaternions, offsets, x, belief, gradient, w, towards, starts, best
+):
+    """Write the velocity of `exact.exact_step` to `best`, return its objective.
+
+    Room to work in: `towards`, per target the way to it (3), its approach axis (3), the value of
+    its rotation and its distance squared, shape (n_targets, 8); `starts`, shape (STARTS, 3).
+    """
+    alpha, delta, offset, speed, tau = packed[0], packed[1], packed[2], packed[3], packed[9]
+    a_r, d_r, c_r, v_r, m = packed[4], packed[5], packed[6], packed[7], packed[8]
+    aside2 = packed[15] * packed[15]
+    n_goals = belief.shape[0]
+    tw, tx, ty, tz = turned(x, tau)
+    ax, ay, az = x[0] + tau * x[7], x[1] + tau * x[8], x[2] + tau * x[9]
+    for k in range(positions.shape[0]):
+        ex, ey, ez = positions[k, 0] - ax, positions[k, 1] - ay, positions[k, 2] - az
+        towards[k, 0], towards[k, 1], towards[k, 2] = ex, ey, ez
+        kw, kx, ky, kz = quaternions[k, 0], quaternions[k, 1], quaternions[k, 2], quaternions[k, 3]
+        towards[k, 3] = 2.0 * (kx * kz + kw * ky)
+        towards[k, 4] = 2.0 * (ky * kz - kw * kx)
+        towards[k, 5] = 1.0 - 2.0 * (kx * kx + ky * ky)
+        r = angle_to(quaternions, k, tw, tx, ty, tz)
+        towards[k, 6] = m * value(r, a_r, d_r, c_r, v_r)
+        towards[k, 7] = ex * ex + ey * ey + ez * ez
+
+    # where to start: no assistance, first order, and into the nearest targets of the likeliest
+    starts[0] = 0.0
+    starts[1] = -gradient[:3] / (2.0 * w)
+    n_starts = 2
+    likelier, likelier_at = math.inf, -1
+    for _ in range(min(RESTART_GOALS, n_goals)):
+        goal = -1
+        for g in range(n_goals):  # the likeliest of those that come after the last one
+            after = belief[g] < likelier or (belief[g] == likelier and g > likelier_at)
+            if after and (goal < 0 or belief[g] > belief[goal]):
+                goal = g
+        likelier, likelier_at = belief[goal], goal
+        nearer, nearer_at = -1.0, -1
+        for _ in range(min(RESTART_TARGETS, offsets[goal + 1] - offsets[goal])):
+            target = -1
+            for k in range(offsets[goal], offsets[goal + 1]):
+                after = towards[k, 7] > nearer or (towards[k, 7] == nearer and k > nearer_at)
+                if after and (target < 0 or towards[k, 7] < towards[target, 7]):
+                    target = k
+            nearer, nearer_at = towards[target, 7], target
+            for i in range(3):
+                starts[n_starts, i] = SHORT_OF_TARGET / tau * towards[target, i]
+            n_starts += 1
+
+    least = math.inf
+    for index in range(n_starts + 1):
+        start = starts[index % n_starts]
+        sx, sy, sz = start[0], start[1], start[2]
+        limit = COARSE
+        if index == n_starts:  # at last, on from the best end
+            sx, sy, sz, limit = best[0], best[1], best[2], TOLERANCE
+        objective = math.inf
+        for step in range(PASSES + 1):
+            # the objective at s, and the quadratic that touches it there
+            ax = ay = az = stiffness = 0.0
+            mxx = mxy = mxz = myy = myz = mzz = 0.0  # (1 − a²) Σ k z zᵀ
+            objective = tau * w * (sx * sx + sy * sy + sz * sz)
+            for g in range(n_goals):
+                value_best, d_best, k_best = math.inf, 0.0, offsets[g]
+                for k in range(offsets[g], offsets[g + 1]):
+                    ex = towards[k, 0] - tau * sx
+                    ey = towards[k, 1] - tau * sy
+                    ez = towards[k, 2] - tau * sz
+                    along = ex * towards[k, 3] + ey * towards[k, 4] + ez * towards[k, 5]
+                    square = aside2 * (ex * ex + ey * ey + ez * ez)
+                    d = math.sqrt(square + (1.0 - aside2) * along * along)
+                    one = value(d, alpha, delta, offset, speed) + towards[k, 6]
+                    if one < value_best:
+                        value_best, d_best, k_best = one, d, k
+                objective += belief[g] * value_best
+                rate = alpha * min(1.0, d_best / delta) + offset
+                pull = belief[g] * rate / (speed * max(d_best, 1e-12))
+                px, py, pz = towards[k_best, 0], towards[k_best, 1], towards[k_best, 2]
+                zx, zy, zz = towards[k_best, 3], towards[k_best, 4], towards[k_best, 5]
+                bent = pull * (1.0 - aside2)
+                along = bent * (px * zx + py * zy + pz * zz)
+                pull *= aside2
+                ax += pull * px + along * zx
+                ay += pull * py + along * zy
+                az += pull * pz + along * zz
+                stiffness += pull
+                mxx, mxy, mxz = mxx + bent * zx * zx, mxy + bent * zx * zy, mxz + bent * zx * zz
+                myy, myz, mzz = myy + bent * zy * zy, myz + bent * zy * zz, mzz + bent * zz * zz
+            if step == PASSES:
+                break
+            # (2w I + τ Σ k L²) n = Σ k L² P, by Cramer's rule
+            diagonal = 2.0 * w + tau * stiffness
+            xx, yy, zz = diagonal + tau * mxx, diagonal + tau * myy, diagonal + tau * mzz
+            xy, xz, yz = tau * mxy, tau * mxz, tau * myz
+            cxx, cxy, cxz = yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy
+            cyy, cyz, czz = xx * zz - xz * xz, xy * xz - xx * yz, xx * yy - xy * xy
+            scale = 1.0 / (xx * cxx + xy * cxy + xz * cxz)
+            nx = (cxx * ax + cxy * ay + cxz * az) * scale
+            ny = (cxy * ax + cyy * ay + cyz * az) * scale
+            nz = (cxz * ax + cyz * ay + czz * az) * scale
+            moved = max(abs(nx - sx), abs(ny - sy), abs(nz - sz))
+            if moved < limit:
+                break
+            sx, sy, sz = nx, ny, nz
+        if objective < least or index == n_starts:
+            least = objective
+            best[0], best[1], best[2] = sx, sy, sz
+    return least

@@ -13,7 +13,6 @@ from app.core.arbitration import ARBITRATIONS
 from app.core.backend import active
 from app.core.both_act import both_act_step
 from app.core.evaluation import GRADIENT, N_ROWS
-from app.core.exact_step import exact_step
 from app.core.situation import Situation
 from app.core.types import Array
 from app.core.yielding import give_way
@@ -84,5 +83,7 @@ def policy_assistance(situation: Situation) -> Array:
     if settings.takeover == "both-act":
         assistance[:3] = both_act_step(situation)
     elif settings.step == "exact":
-        assistance[:3] = exact_step(situation)
+        assistance[:3] = active().exact_step(
+            settings, situation.goals, situation.x, situation.belief, situation.expected_gradient
+        )
     return assistance

@@ -5,12 +5,13 @@ import numpy as np
 from app.core.belief import Evidence, condition
 from app.core.checks import SMALLEST_QUATERNION
 from app.core.evaluation import BELIEF, GRADIENT, evaluate, soft_min
-from app.core.exact import descend
+from app.core.exact import exact_step
+from app.core.rotations import approach_axes
 from app.core.settings import AssistanceSettings
 from app.core.types import Array, Goals, Rows
-from app.core.values import translation_cost, value
+from app.core.values import translation_cost, value, weigh
 
-__all__ = ["NAME", "descend", "evaluate", "fill_grid", "update"]
+__all__ = ["NAME", "evaluate", "exact_step", "fill_grid", "update"]
 
 NAME: str = "numpy"
 
@@ -75,14 +76,15 @@ def fill_grid(
     grid: Array,
 ) -> None:
     """Fill `grid` with Σ_g weights(g) V_g on a plane (`slices.value_slice`)."""
-    cost = translation_cost(settings)
+    cost, axes = translation_cost(settings), approach_axes(goals.quaternions)
     along_v = np.linspace(0.0, 1.0, grid.shape[1])[:, None] * v
     for i, share in enumerate(np.linspace(0.0, 1.0, grid.shape[0])):
         points = start + share * u + along_v
         grid[i] = 0.0
         for goal in np.flatnonzero(weights):
             own = slice(goals.offsets[goal], goals.offsets[goal + 1])
-            distance = np.linalg.norm(points[:, None, :] - goals.positions[own], axis=2)
+            way = points[:, None, :] - goals.positions[own]
+            distance = np.linalg.norm(weigh(way, axes[own], settings.translation_aside), axis=2)
             values = value(distance, cost) + rotation_values[own]
             one_goal = np.array([0, values.shape[1]])
             if temperature == 0.0:

@@ -33,13 +33,14 @@ PRESETS: dict[str, dict[str, Any]] = {
         "max_angular_acceleration": math.inf,
     },
     # Argued in docs/method.md.
-    "default": {},
+    "default": {"translation_aside": 1.5},
 }
 
 METHOD_DEFAULTS: dict[str, dict[str, Any]] = {
     # Argued in docs/method.md: stronger help is felt as help where it gives way.
     "yielding": {
         "gain": 2.0,
+        "beta": 24.0,
         "w_l": 80.0,
         "translation_offset": 1.5,
         "step": "exact",

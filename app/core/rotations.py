@@ -30,6 +30,14 @@ def from_rotation_vector(vector: Array) -> Array:
     return np.array([math.cos(0.5 * angle), scale * x, scale * y, scale * z])
 
 
+def approach_axes(quaternions: Array) -> Array:
+    """Return the third axis (z, along which a gripper approaches) of orientations, (n, 3)."""
+    w, x, y, z = quaternions.T
+    return np.stack(
+        [2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)], axis=1
+    )
+
+
 def rotation_between(quaternions: Array, quaternion: Array) -> tuple[Array, Array]:
     """Return angle and sine-scaled axis of the rotations that lead from one pose to targets.
 

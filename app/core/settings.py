@@ -69,6 +69,7 @@ class AssistanceSettings:
     translation_delta: float = 0.07  # δ [m]
     translation_offset: float = 0.2  # c₀ [nat/s]
     translation_speed: float = 1.0  # v_to [m/s]
+    translation_aside: float = 1.0  # a, metres along a grasp's approach that one aside of it counts
     rotation_alpha: float = 0.20  # [nat/s]
     rotation_delta: float = math.pi / 32  # [rad]
     rotation_offset: float = 0.01  # [nat/s]
@@ -127,6 +128,7 @@ class AssistanceSettings:
                 self.belief_max,
                 self.belief_floor,
                 1.0 if self.belief_surplus == "equal" else 0.0,
+                self.translation_aside,
             ]
         )
 
@@ -155,6 +157,7 @@ _RANGES: dict[str, tuple[float, float, bool]] = {
     "translation_delta": (*_UNBOUNDED, True),
     "translation_offset": (*_UNBOUNDED, False),
     "translation_speed": (*_UNBOUNDED, True),
+    "translation_aside": (1.0, math.inf, False),
     "rotation_alpha": (*_UNBOUNDED, False),
     "rotation_delta": (*_UNBOUNDED, True),
     "rotation_offset": (*_UNBOUNDED, False),

@@ -7,6 +7,11 @@ cost-to-go is its integral,
     V(d) = (α d − α δ/2 + c₀ d)/v  for d > δ,    V(d) = (α d²/(2δ) + c₀ d)/v  for d ≤ δ.
 
 Rotation has the same form in the angle r, with its own constants; V = V_t(d) + m V_r(r).
+
+A gripper that arrives from the side pushes its object over. So a metre aside of a target's
+approach axis z may count as a ≥ 1 metres along it: d = |L e|, L = z zᵀ + a (I − z zᵀ), e the way to
+the target. With a = 1 this is the paper's |e|; with more, V prefers grasps that lie ahead, and the
+way down turns into the approach before it ends.
 Shapes: distances are arrays of any shape; results have the same.
 """
 
@@ -50,6 +55,20 @@ def rotation_cost(settings: AssistanceSettings) -> Cost:
 def cost_rate(distance: Array, cost: Cost) -> Array:
     """Return C(d) [nat/s]."""
     return cost.alpha * np.minimum(1.0, distance / cost.delta) + cost.offset
+
+
+def weigh(way: Array, axes: Array, aside: float) -> Array:
+    """Return L e: ways whose parts aside of the approach axes count `aside` times.
+
+    Args:
+        way: e, to or from targets [m], shape (…, 3).
+        axes: z of the targets, unit, shape (…, 3).
+        aside: a; 1 returns `way` itself.
+    """
+    if aside == 1.0:
+        return way
+    along = (way * axes).sum(axis=-1, keepdims=True)
+    return aside * way + (1.0 - aside) * along * axes
 
 
 def value(distance: Array, cost: Cost) -> Array:

@@ -24,9 +24,9 @@ from app.core import (
     preset,
 )
 from app.core.both_act import both_act_values, expected_speeds
-from app.core.rotations import from_rotation_vector, multiply, rotation_between
+from app.core.rotations import approach_axes, from_rotation_vector, multiply, rotation_between
 from app.core.types import Array
-from app.core.values import rotation_cost, translation_cost, value
+from app.core.values import rotation_cost, translation_cost, value, weigh
 
 from . import scenes
 
@@ -121,7 +121,10 @@ def objective(
     fixed = variant.rotation_weight * value(angles, rotation_cost(variant))
 
     def evaluate(s: Array) -> float:
-        distances = np.linalg.norm(goals.positions - y - tau * s, axis=1)
+        way = goals.positions - y - tau * s
+        along = (way * approach_axes(goals.quaternions)).sum(axis=1)
+        squares = (way**2).sum(axis=1) - along**2
+        distances = np.sqrt(along**2 + variant.translation_aside**2 * squares)
         least = np.minimum.reduceat(
             value(distances, translation_cost(variant)) + fixed, goals.offsets[:-1]
         )
@@ -130,9 +133,9 @@ def objective(
     return evaluate, y
 
 
-@pytest.mark.parametrize("w", [20.0, 2.0])
+@pytest.mark.parametrize(("w", "aside"), [(20.0, 1.0), (2.0, 1.0), (20.0, 2.0)])
 @pytest.mark.parametrize("n_targets", [1, 8])
-def test_the_exact_step_minimises_the_objective(w: float, n_targets: int) -> None:
+def test_the_exact_step_minimises_the_objective(w: float, aside: float, n_targets: int) -> None:
     """Against scipy from many starts: the minimiser with one target a goal, else the gap."""
     rng = np.random.default_rng(7)
     gaps, misses, first_order = [], [], []
@@ -140,6 +143,7 @@ def test_the_exact_step_minimises_the_objective(w: float, n_targets: int) -> Non
         goals, pose = scenes.random_goals(rng, 3, n_targets), scenes.random_pose(rng)
         belief, direct = rng.dirichlet(np.ones(3)), scenes.random_twist(rng, rotating=False)
         variant = preset("ada", method="policy", step="exact", w_translation=w)
+        variant = dataclasses.replace(variant, translation_aside=aside)
         state = initial_state(goals, variant, belief)
         asked = counterfactuals(variant, goals, state, pose, direct)["policy"]
         plain = dataclasses.replace(variant, step="first-order")
@@ -200,7 +204,9 @@ def test_any_number_of_goals_and_targets(shape: tuple[int, int]) -> None:
         state, _ = assist(variant, goals, state, pose, twist(0.1, 0.05), 0.01)
     _, step = assist(variant, goals, state, pose, twist(0.1, 0.05), 0.01)
     angles, _ = rotation_between(goals.quaternions, pose.quaternion)
-    distances = np.linalg.norm(goals.positions - pose.position, axis=1)
+    axes = approach_axes(goals.quaternions)
+    way = weigh(goals.positions - pose.position, axes, variant.translation_aside)
+    distances = np.linalg.norm(way, axis=1)
     all_values = value(distances, translation_cost(variant))
     all_values += variant.rotation_weight * value(angles, rotation_cost(variant))
     np.testing.assert_allclose(step.values, all_values.reshape(shape).min(axis=1), atol=1e-12)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from app.core import AssistanceSettings, CoreError, assist, backend, initial_state, preset
+from app.core import AssistanceSettings, CoreError, assist, backend, exact, initial_state, preset
 from app.core import value_slice as draw_slice
 from app.core.belief import bounded
 from app.core.types import Array, Goals, Pose
@@ -27,6 +27,8 @@ VARIANTS = [
     preset("ada"),
     preset("ada", temperature=0.5),
     preset("ada", step="exact", w_translation=5.0),
+    preset("default", translation_aside=1.4, step="exact"),
+    preset("ada", translation_aside=3.0),
 ]
 FIELDS = ("direct", "assistance", "twist", "belief", "values", "q_values", "best_targets")
 
@@ -61,11 +63,23 @@ def test_compiled_and_numpy_agree(variant: AssistanceSettings, seed: int) -> Non
         np.testing.assert_allclose(a, b, rtol=1e-12, atol=1e-12)
 
 
+@pytest.mark.parametrize(
+    "name", ["PASSES", "COARSE", "TOLERANCE", "RESTART_GOALS", "SHORT_OF_TARGET"]
+)
+def test_the_exact_steps_constants_are_one(name: str) -> None:
+    """The kernels hold their own copies, for the sake of the cache."""
+    kernels = importlib.import_module("app.core.kernels")
+    assert getattr(kernels, name) == getattr(exact, name)
+    assert kernels.STARTS == 2 + exact.RESTART_GOALS * exact.RESTART_TARGETS
+
+
+@pytest.mark.parametrize("aside", [1.0, 1.5])
 @pytest.mark.parametrize("kind", ["min", "soft-min"])
-def test_slices_agree(kind: str) -> None:
+def test_slices_agree(kind: str, aside: float) -> None:
     """A value slice is the same compiled and in numpy, and the same as V at each point."""
     rng = np.random.default_rng(3)
-    goals, variant = scenes.random_goals(rng, 3, 16), preset("default")
+    goals = scenes.random_goals(rng, 3, 16)
+    variant = preset("default", translation_aside=aside)
     quaternion = scenes.random_quaternions(rng, 1)[0]
     drawn = {}
     for choice in ("compiled", "numpy"):

@@ -49,12 +49,14 @@ def moved(pose: Pose, twist: Array, seconds: float) -> Pose:
     return Pose(pose.position + seconds * twist[:3], multiply(turn, pose.quaternion))
 
 
+@pytest.mark.parametrize("aside", [1.0, 1.6])
 @QUICK
 @given(seed=scenes.seeds)
-def test_gradients_are_the_slopes_of_the_values(seed: int) -> None:
+def test_gradients_are_the_slopes_of_the_values(aside: float, seed: int) -> None:
     """∇V by central differences, translation and rotation, away from kinks of the minimum."""
     rng = np.random.default_rng(seed)
-    goals, pose, variant = scenes.random_goals(rng, 3, 5), scenes.random_pose(rng), free()
+    goals, pose = scenes.random_goals(rng, 3, 5), scenes.random_pose(rng)
+    variant = free(translation_aside=aside)
     x = np.concatenate([pose.position, pose.quaternion, np.zeros(6)])
     rows, best = np.empty((N_ROWS, 3)), np.empty(3, dtype=np.int64)
     evaluate(variant, goals, x, rows, best)

@@ -152,7 +152,8 @@ def test_the_picture_is_lowest_at_the_goal(
     assert pixels.shape == (160, 140, 4)
     strongest = np.argwhere(pixels[..., 3] > 0.9 * pixels[..., 3].max())  # (row, column)
     spot = strongest.mean(axis=0)[::-1] * CELL_M + [0.0, -0.6]
-    assert spot == pytest.approx([0.82, -0.22], abs=0.03)  # the glass stands at the third place
+    # The glass stands at the third place; from where one approaches it, V is lower than aside.
+    assert spot == pytest.approx([0.82, -0.22], abs=0.04)
 
 
 def test_a_slice_that_cannot_be_computed_does_not_end_the_view(
