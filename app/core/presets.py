@@ -41,7 +41,7 @@ METHOD_DEFAULTS: dict[str, dict[str, Any]] = {
     "yielding": {
         "gain": 2.0,
         "beta": 24.0,
-        "w_l": 80.0,
+        "w_l": 100.0,
         "translation_offset": 1.5,
         "step": "exact",
         "idle_drift": 1.0,

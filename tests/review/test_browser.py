@@ -38,6 +38,11 @@ POSES = """() => {
     .map(([name, { wxyz, position }]) => [name, { wxyz: [...wxyz], position: [...position] }]));
 }"""
 
+LINKS = """() => JSON.stringify(
+  Object.entries(window.__viserMutable?.nodePoseData ?? {})
+    .filter(([name, pose]) => name.startsWith('/hindsight/arm') && pose)
+    .map(([name, { wxyz, position }]) => [name, [...wxyz], [...position]]))"""
+
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
@@ -289,6 +294,11 @@ def test_a_trial_is_shared(page: Page, logs: Logs, browser: Browser, tmp_path: P
     with open_page(browser, html.as_uri(), (480, 320)) as alone:
         alone.wait_for_selector("canvas", timeout=WAIT_MS)
         assert "http://" not in alone.url
+        # It plays by itself: the arm's links are elsewhere a moment later.
+        alone.wait_for_function(f"() => ({LINKS})().length > 50", timeout=WAIT_MS)
+        first = alone.evaluate(LINKS)
+        alone.wait_for_function(f"first => ({LINKS})() !== first", arg=first, timeout=WAIT_MS)
+        alone.screenshot(path=tmp_path / "alone.png")
     link = url.input_value().replace("/review#", f"/review{PLAIN}#")
     with open_page(browser, link) as there:
         there.set_default_timeout(WAIT_MS)

@@ -7,9 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from app.recording.reader import read_trial
 from app.study.visitor import Visitor
 from tests.browser import chromium, open_page
-from tests.study.person import go_on, step_of, take_part
+from tests.study.person import do_trial, go_on, step_of, take_part
 from tests.study.server import StudyServer
 from tests.study.traffic import Traffic
 
@@ -63,6 +64,32 @@ def test_participants_from_link_to_code_in_both_orders(server: StudyServer):
         items = ("control", "wanted", "quickly", "like")
         expected = {(f"method{k}", item): 6 for k in (1, 2) for item in items}
         assert said == {**expected, ("", "prefer"): 6 if order[0] == "blend" else 2}
+
+
+@pytest.mark.slow
+def test_full_screen_and_slow_pictures_are_in_the_trials_log(server: StudyServer):
+    """What a participant's screen did meanwhile stands beside what the participant did."""
+    slow_down = """() => {
+      const draw = window.requestAnimationFrame;
+      window.requestAnimationFrame = (step) => setTimeout(() => draw(step), 200);
+      setTimeout(() => { window.requestAnimationFrame = draw; }, 4000);
+    }"""
+    before = set(server.sessions.rglob("*.mcap"))
+    with chromium() as browser, open_page(browser, f"{server.url}/?fast=1") as page:
+        take_part(page, until=("training",))
+        page.wait_for_function(
+            "() => document.querySelector('[data-testid=trial]').dataset.outcome === 'running'",
+            timeout=90_000,
+        )
+        page.evaluate("() => document.documentElement.requestFullscreen()")
+        page.evaluate("() => document.exitFullscreen()")
+        page.evaluate(slow_down)
+        page.wait_for_timeout(5000)
+        assert do_trial(page) == "grasped"
+        page.wait_for_timeout(2000)
+    (log,) = set(server.sessions.rglob("*.mcap")) - before
+    names = [event.name for event in read_trial(log).events]
+    assert {"fullscreen", "windowed", "frames_low"} <= set(names)
 
 
 def table(server: StudyServer, what: str) -> list[dict[str, str]]:
