@@ -44,7 +44,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--with-comments", action="store_true", help="export what participants wrote, too"
     )
-    parser.add_argument("--out", type=Path, metavar="DIR", help="where an export goes")
+    parser.add_argument(
+        "--out", type=Path, metavar="DIR", help="where an export goes, or a dry run's study is kept"
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -90,7 +92,7 @@ def run(args: argparse.Namespace) -> int:
     if args.dry_run:
         from app.study.dry_run import dry_run
 
-        return dry_run(target, args.participants)
+        return dry_run(target, args.participants, args.out)
     return _host(args, target)
 
 

@@ -22,24 +22,27 @@ from app.study.visitor import Visitor
 START_S = 120.0
 
 
-def dry_run(target: str, participants: int = 0) -> int:
+def dry_run(target: str, participants: int = 0, out: Path | None = None) -> int:
     """Send participants through a test run in a folder of its own, and say what came out.
 
     Args:
         target: A study's name or file.
         participants: How many; 0: two for every cell. More than there are places wait.
+        out: Folder of sessions to leave the study in, to try an analysis on; None: it is deleted.
 
     Returns:
         The exit code: 0 where everybody got a code and the tables are right to the row.
 
     Raises:
-        StudyError: If the server does not start.
+        StudyError: If the server does not start, or there is such a study in `out`.
     """
     study = load_study(target)
+    if out is not None and (out / study.name).exists():
+        raise StudyError(f"{out / study.name} exists already; name another folder with --out")
     print(check(study) + "\n")
     n = participants or 2 * len(cells(study))
     with tempfile.TemporaryDirectory(prefix="hindsight-dry-run-") as folder:
-        sessions = Path(folder) / "sessions"
+        sessions = out or Path(folder) / "sessions"
         process, url = _serve(target, sessions, Path(folder) / "server.log")
         began = time.monotonic()
         try:
@@ -50,6 +53,8 @@ def dry_run(target: str, participants: int = 0) -> int:
         problems += _check_tables(sessions / study.name, study.name, n, len(cells(study)))
     took = time.monotonic() - began
     print(f"{n} simulated participants in {took:.0f} s; {waited} times no place was free")
+    if out is not None:
+        print(f"The study is in {out / study.name}")
     for problem in problems:
         print(f"problem: {problem}", file=sys.stderr)
     print("The dry run found no problem." if not problems else f"{len(problems)} problems.")
