@@ -15,7 +15,8 @@ def make_goals(targets: Mapping[str, tuple[Any, Any]]) -> Goals:
 
     Args:
         targets: Per goal's name the target positions in the world frame [m], shape (n, 3), and
-            quaternions w x y z, shape (n, 4), n ≥ 1. Quaternions are scaled to unit norm.
+            quaternions w x y z, shape (n, 4), n ≥ 1. Quaternions are scaled to unit norm. The
+            third axis of a target is the way it is approached, where `translation_aside` > 1.
 
     Raises:
         CoreError: If there is no goal, a goal has no target, or an array has another shape, is not
