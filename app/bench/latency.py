@@ -47,6 +47,14 @@ async (moves) => {
   const probe = () => document.querySelector('[data-testid="viewer"]')
     .contentWindow.__viserMutable?.nodePoseData?.['/probe']?.position?.[0] ?? -1;
   const latencies = [];
+  const frames = [];
+  let last = 0;
+  const each = (now) => {
+    if (last) frames.push(now - last);
+    last = now;
+    requestAnimationFrame(each);
+  };
+  requestAnimationFrame(each);
   point('pointerdown', 0, 0);
   for (let i = 0; i < moves; i++) {
     for (let wait = 3 + (i * 7) % 5; wait > 0; wait--) await frame();
@@ -65,13 +73,16 @@ async (moves) => {
     }
   }
   point('pointerup', 0, 0);
-  return latencies;
+  return [latencies, frames];
 }
 """
 
 
 def bench_latency() -> dict[str, dict[str, Any]]:
-    """{"latency": {median, p99, unit}} [ms]; empty, with a reason, where no browser is found."""
+    """Latency, and the time between two frames of the page, which most of it is, [ms].
+
+    Empty, with a reason, where no browser is found.
+    """
     browser = find_browser()
     if browser is None or find_spec("playwright") is None:
         print("latency: left out, no Chromium or no playwright here", file=sys.stderr)
@@ -96,14 +107,17 @@ def bench_latency() -> dict[str, dict[str, Any]]:
                 page.wait_for_selector('[data-testid="connection"][data-state="connected"]')
                 page.evaluate(UNTIL_DRAWN)
                 page.wait_for_timeout(2000)
-                latencies = page.evaluate(MEASURE, N_MOVES)
+                latencies, frames = page.evaluate(MEASURE, N_MOVES)
         finally:
             server.terminate()
             server.wait(30)
     if len(latencies) < N_MOVES // 2:
         print(f"latency: only {len(latencies)} of {N_MOVES} moves were seen", file=sys.stderr)
-    median, p99 = np.percentile(latencies, [50, 99])
-    return {"latency": {"median": float(median), "p99": float(p99), "unit": "ms"}}
+    measured = {"latency": latencies, "frame": frames}
+    return {
+        name: {"median": float(np.median(ms)), "p99": float(np.percentile(ms, 99)), "unit": "ms"}
+        for name, ms in measured.items()
+    }
 
 
 def _read_address(server: "subprocess.Popen[str]") -> str:
