@@ -37,7 +37,7 @@ test: $(STAMP) browser  ## all tests but the slow ones, at most 8 minutes on two
 	$(BIN)/pytest -m "browser and not slow"
 
 test-all: $(STAMP) browser  ## what `make test` leaves out, at most 30 minutes on two cores
-	$(PYTEST) -m "slow and not browser"
+	$(BIN)/pytest -n 2 --dist worksteal -m "slow and not browser"
 	$(BIN)/pytest -m "slow and browser"
 
 check: $(STAMP)  ## style and types

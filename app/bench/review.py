@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from websockets.sync.client import connect
 
+from app.bench.review_page import N_SCRUBS, bench_page
 from app.bench.served import Served, running
 from app.core import UserInput, preset
 from app.errors import AppError
@@ -44,12 +45,15 @@ class ReviewBenchError(AppError):
     """What was asked of the bench makes no sense, or the review did not answer."""
 
 
-def bench_review(minutes: float = 10.0, n_trials: int = N_TRIALS) -> Figures:
+def bench_review(
+    minutes: float = 10.0, n_trials: int = N_TRIALS, n_scrubs: int = N_SCRUBS
+) -> Figures:
     """Record a long trial, and open it again and again.
 
     Args:
         minutes: How long the trial is.
         n_trials: How many trials of this length are opened in a row.
+        n_scrubs: How many moments are gone to in the page.
 
     Returns:
         "first_open": where the cache has yet to be made [s]; "open": from the cache [s]; "seek":
@@ -71,9 +75,7 @@ def bench_review(minutes: float = 10.0, n_trials: int = N_TRIALS) -> Figures:
         with running(command) as server:
             ids = [path.relative_to(root).as_posix() for path in (log, fresh, *trials)]
             figures = _measure(server, *ids)
-            from app.bench.review_page import bench_page
-
-            return figures | bench_page(server.url, ids[2:])
+            return figures | bench_page(server.url, ids[2:], n_scrubs)
 
 
 def record_long(root: Path, n_steps: int) -> Path:

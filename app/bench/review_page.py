@@ -55,7 +55,7 @@ DRAWN = """() => document.querySelector('[data-testid=viewer]')
   .contentWindow.__viserMutable?.nodePoseData?.['/probe']"""
 
 
-def bench_page(url: str, trials: list[str]) -> dict[str, dict[str, Any]]:
+def bench_page(url: str, trials: list[str], n_scrubs: int = N_SCRUBS) -> dict[str, dict[str, Any]]:
     """Names → {median, p95, p99, unit}: page_open [s], page_scrub [ms].
 
     Empty, with a reason, where there is no browser. Without a graphics card the page leaves out
@@ -64,6 +64,7 @@ def bench_page(url: str, trials: list[str]) -> dict[str, dict[str, Any]]:
     Args:
         url: Of the review.
         trials: Ids of trials whose caches are there, of the same length.
+        n_scrubs: How many moments are gone to.
     """
     browser = find_browser()
     if browser is None or find_spec("playwright") is None:
@@ -82,7 +83,7 @@ def bench_page(url: str, trials: list[str]) -> dict[str, dict[str, Any]]:
             opened = [page.evaluate(OPEN, trial) for trial in trials[: N_OPENED + 1]][1:]
             page.wait_for_function(DRAWN)
             page.wait_for_timeout(2000)
-            taken = page.evaluate(SCRUB, N_SCRUBS)
+            taken = page.evaluate(SCRUB, n_scrubs)
         finally:
             running.close()
     return {"page_open": _figure(opened, "s"), "page_scrub": _figure(taken, "ms")}

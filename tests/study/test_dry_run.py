@@ -22,7 +22,7 @@ def test_a_dry_runs_study_is_kept_and_can_be_analysed(
     assert "1: 2, 2: 2" in said and "found no problem" in said
     report = analyze(tmp_path / "paper", tmp_path / "report", print)
     assert report.is_file() and (report.parent / "figures").is_dir()
-    results = compute_results(load(tmp_path / "paper"))
+    results = compute_results(load(tmp_path / "paper", print), print)
     assert len(results.participants) == 4
     with pytest.raises(StudyError, match="exists already"):
         dry_run("paper", out=tmp_path)
