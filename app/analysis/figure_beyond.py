@@ -34,6 +34,7 @@ def draw_explored(explored: list[Explored]) -> Figure:
                     ms=6,
                 )
         axes.margins(x=0.12)
+        axes.locator_params(axis="x", nbins=4)
         first = axes in grid[::columns]
         axes.set_yticks([-i for i in range(len(methods))], methods if first else [])
         axes.set_ylim(-len(methods) + 0.4, 0.6)

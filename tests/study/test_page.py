@@ -81,8 +81,13 @@ def test_full_screen_and_slow_pictures_are_in_the_trials_log(server: StudyServer
             "() => document.querySelector('[data-testid=trial]').dataset.outcome === 'running'",
             timeout=90_000,
         )
-        page.evaluate("() => document.documentElement.requestFullscreen()")
-        page.evaluate("() => document.exitFullscreen()")
+        for change in ("documentElement.requestFullscreen", "exitFullscreen"):
+            page.evaluate(
+                f"""() => new Promise((done) => {{
+                  document.addEventListener('fullscreenchange', done, {{ once: true }});
+                  document.{change}();
+                }})"""
+            )
         page.evaluate(slow_down)
         page.wait_for_timeout(5000)
         page.reload()  # the trial is interrupted, its log closed
