@@ -171,7 +171,7 @@ def draw_takeover() -> Figure:
     variants = [("robot takes over", preset("ada"), "-", LIGHT["m3"])]
     for index, speed in enumerate((0.0, 0.056, 0.15)):
         label = f"both act, user {1000 * speed:.0f} mm/s"
-        settings = preset("default", takeover="both-act", user_speed=speed)
+        settings = preset("default", takeover="both-act", user_speed=speed, translation_aside=1.0)
         variants.append((label, settings, ("--", "-.", ":")[index], GOAL_COLOURS[index]))
     for label, settings, style, colour in variants:
         state = initial_state(goals, settings)
