@@ -12,7 +12,6 @@ from typing import Any
 
 import numba
 from numba import float64, int64
-from numba.types import UniTuple
 
 _VECTOR, _MATRIX, _ROWS = float64[::1], float64[:, ::1], int64[::1]
 # As in exact.py; not imported, since the cache would not see them change.
@@ -77,7 +76,7 @@ def along_approach(quaternions, k, ex, ey, ez):
     return along + ez * (1.0 - 2.0 * (x * x + y * y))
 
 
-@compile_kernel(UniTuple(float64, 4)(_VECTOR, float64))
+@compile_kernel("UniTuple(float64, 4)(float64[::1], float64)")
 def turned(x, tau):
     """Return the unit quaternion exp(τ[ω]×) R of a row (position, quaternion, twist)."""
     norm = math.sqrt(x[3] * x[3] + x[4] * x[4] + x[5] * x[5] + x[6] * x[6])
