@@ -1,4 +1,4 @@
-"""The numpy path of the core's three inner functions; the compiled one is `compiled_backend.py`."""
+"""The numpy path of the core's inner functions; the compiled one is `compiled_backend.py`."""
 
 import numpy as np
 

@@ -110,7 +110,7 @@ class AssistanceSettings:
 
     @cached_property
     def packed(self) -> Array:
-        """The costs as the compiled kernels read them, in the order of `kernels.unpack`."""
+        """The costs as the compiled kernels read them, in the order of `kernels.evaluate`."""
         return np.array(
             [
                 self.translation_alpha,
