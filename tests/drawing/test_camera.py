@@ -1,8 +1,14 @@
 """Camera presets: what the design says at its shapes, everything in sight at others."""
 
+import time
+from collections.abc import Callable
+
+import msgspec
 import numpy as np
 import pytest
 import viser
+from websockets.sync.client import connect
+from websockets.typing import Subprotocol
 
 from app.session.drawing import Viewer
 from app.session.drawing.camera import OPERATOR_BY_ASPECT, TOP, CameraError, view_for
@@ -55,3 +61,55 @@ def test_presets_and_reset(server: viser.ViserServer, viewer: Viewer) -> None:
     with pytest.raises(CameraError, match="operator, side, top, reset"):
         viewer.set_camera("ceiling")
     assert viewer.camera == "side"
+
+
+def test_a_panel_of_another_shape_is_framed_anew_unless_it_was_moved(
+    server: viser.ViserServer, viewer: Viewer
+) -> None:
+    """A second view halves it, a phone is turned; a camera moved by hand stays where it is."""
+    protocol = Subprotocol(f"viser-v{viser.__version__}")
+    url = f"ws://127.0.0.1:{server.get_port()}"
+    with connect(url, subprotocols=[protocol], compression=None, max_size=None) as browser:
+
+        def tell(position: tuple[float, float, float], width: int) -> None:
+            message = {
+                "type": "ViewerCameraMessage",
+                "wxyz": (1.0, 0.0, 0.0, 0.0),
+                "position": position,
+                "fov": 0.66,
+                "near": 0.01,
+                "far": 100.0,
+                "image_height": 500,
+                "image_width": width,
+                "look_at": (0.4, 0.0, 0.1),
+                "up_direction": (0.0, 0.0, 1.0),
+            }
+            browser.send(msgspec.msgpack.encode(message))
+
+        def stands_at(position: tuple[float, float, float]) -> Callable[[], bool]:
+            return lambda: any(
+                np.allclose(client.camera.position, position)
+                for client in server.get_clients().values()
+            )
+
+        wide, narrow = (view_for("operator", aspect).position for aspect in (1.6, 0.8))
+        tell((3.0, 3.0, 3.0), 800)
+        wait_until(stands_at(wide))
+        tell(wide, 400)
+        wait_until(stands_at(narrow))
+        tell(wide, 400)  # viser's first view, taken up late
+        wait_until(stands_at(narrow))
+        tell((0.0, -2.0, 1.0), 800)
+        wait_until(stands_at((0.0, -2.0, 1.0)))
+        tell((0.0, -2.0, 1.1), 400)
+        wait_until(stands_at((0.0, -2.0, 1.1)))
+        time.sleep(0.2)
+        assert stands_at((0.0, -2.0, 1.1))()
+
+
+def wait_until(condition: Callable[[], bool]) -> None:
+    """Wait until it holds; patience only ends a test that would hang."""
+    deadline = time.monotonic() + 30.0
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.01)

@@ -1,5 +1,6 @@
 """Where the operator looks from: presets, fitted to the panel's shape."""
 
+import threading
 from dataclasses import dataclass
 from typing import Literal
 
@@ -39,6 +40,11 @@ such as a phone held sideways, look up a little, so that the elbow stays below t
 SIDE = View((0.45, -1.75, 0.5), (0.42, 0.0, 0.16), 36.0)
 TOP = View((0.465, 0.0, 2.1), (0.47, 0.0, 0.0), 36.0)
 """y is equal in both points: otherwise the picture rolls."""
+INITIAL_ASPECT = 1.6
+SAME_SHAPE = 0.02
+"""Aspects that differ by less, as a logarithm, are framed alike."""
+SAME_PLACE_M = 0.01
+"""A camera this near to where it was put has not been moved by hand [m]."""
 FITTED_ASPECT = 4 / 3
 """Side and top are framed for this width to height; narrower panels see them from further away."""
 
@@ -77,13 +83,21 @@ def _from_further(view: View, times: float) -> View:
 
 
 class Cameras:
-    """Puts the cameras of all connected browsers where a preset says, and of those to come."""
+    """Puts the cameras of all connected browsers where a preset says, and of those to come.
+
+    A panel that changes its shape (a phone is turned, a second view joins) is framed anew, unless
+    its camera was moved by hand meanwhile.
+    """
 
     def __init__(self, server: viser.ViserServer, preset: Preset = "operator"):
         self._server = server
         self.preset: str = preset
         self._closed = False
+        self._framed: dict[int, tuple[float, View]] = {}
+        """Client's id → aspect and view that it was given last."""
+        self._placing = threading.Lock()
         server.on_client_connect(self._arrived)
+        server.on_client_disconnect(self._left)
         self._set_initial()
 
     def set(self, preset: str) -> None:
@@ -96,29 +110,66 @@ class Cameras:
         view_for(wanted, 1.0)
         self.preset = wanted
         self._set_initial()
-        for client in self._server.get_clients().values():
-            self._place(client)
+        with self._placing:
+            for client in self._server.get_clients().values():
+                self._place(client)
 
     def close(self) -> None:
-        """Leave browsers that connect from now on to another view; viser keeps its callbacks."""
+        """Leave browsers to another view from now on; viser keeps its callbacks."""
         self._closed = True
 
     def _set_initial(self) -> None:
         """A first view for the moment before a browser has told its shape."""
-        view, camera = view_for(self.preset, 1.6), self._server.initial_camera
+        view, camera = view_for(self.preset, INITIAL_ASPECT), self._server.initial_camera
         camera.position, camera.look_at = view.position, view.look_at
         camera.fov = float(np.radians(view.fov_degrees))
 
     def _arrived(self, client: viser.ClientHandle) -> None:
-        if not self._closed:
+        if self._closed:
+            return
+
+        @client.camera.on_update
+        def _(_: viser.CameraHandle) -> None:
+            with self._placing:
+                if self._is_astray(client):
+                    self._place(client)
+
+        with self._placing:
             self._place(client)
 
+    def _left(self, client: viser.ClientHandle) -> None:
+        self._framed.pop(client.client_id, None)
+
+    def _is_astray(self, client: viser.ClientHandle) -> bool:
+        """Whether the camera is not where this panel's shape wants it, and nobody moved it there.
+
+        A browser may take up the first view after it was given one of its own.
+        """
+        framed = self._framed.get(client.client_id)
+        if self._closed or framed is None:
+            return False
+        aspect, view = framed
+        if _is_at(client, view):
+            return bool(abs(np.log(_aspect_of(client) / aspect)) > SAME_SHAPE)
+        return _is_at(client, view_for(self.preset, INITIAL_ASPECT))
+
     def _place(self, client: viser.ClientHandle) -> None:
-        camera = client.camera
-        view = view_for(self.preset, float(camera.aspect))
+        camera, aspect = client.camera, _aspect_of(client)
+        view = view_for(self.preset, aspect)
+        self._framed[client.client_id] = (aspect, view)
         with client.atomic():
             camera.fov = float(np.radians(view.fov_degrees))
             camera.position = view.position
             camera.look_at = view.look_at
             camera.up_direction = (0.0, 0.0, 1.0)
         client.flush()
+
+
+def _aspect_of(client: viser.ClientHandle) -> float:
+    """Width divided by height; a panel that is hidden has neither."""
+    width, height = client.camera.image_width, client.camera.image_height
+    return width / height if width and height else INITIAL_ASPECT
+
+
+def _is_at(client: viser.ClientHandle, view: View) -> bool:
+    return bool(np.allclose(client.camera.position, view.position, atol=SAME_PLACE_M))
