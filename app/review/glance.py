@@ -1,9 +1,11 @@
 """What a list shows of each trial beyond its entry: the hand's path and the share of opposition.
 
-Both need the steps, so they are looked up beside the event loop and join the list as they come.
+Both need the steps, so they are looked up beside the event loop and join the list as they come:
+from the cache; where that is missing from the log, in a process of its own, which makes the cache.
 """
 
 import logging
+import os
 import threading
 from collections import OrderedDict
 from collections.abc import Sequence
@@ -13,12 +15,19 @@ import msgspec
 import numpy as np
 
 from app.core.measures import COLUMNS, compute_measures
-from app.recording.cache import load_cache
+from app.recording.cache import cache_path, load_cache
+from app.recording.columns import TrialLog
 from app.review.folder import Listed
+from app.review.jobs import Job, Progress, Result, kill, run
+from app.review.opening import open_trial
 
 POINTS = 24
 """Points of a small picture's line."""
 MAX_KEPT = 5000
+MAX_STEPS = 60_000
+"""A longer log without a cache (10 minutes, 10 s of work) waits for somebody to open it."""
+POLITENESS = 10
+"""Added to the niceness of a process that reads a log: whoever looks at a trial goes first."""
 
 logger = logging.getLogger("hindsight.review")
 _COLUMNS = (*COLUMNS, "hand_position_m")
@@ -42,6 +51,7 @@ class Glances:
         self._changed = threading.Condition()
         self._closing = False
         self._thread: threading.Thread | None = None
+        self._job: Job | None = None
 
     def get(self, listed: Listed) -> Glance | None:
         """The glance at a trial if it is known by now."""
@@ -50,7 +60,10 @@ class Glances:
     def want(self, trials: Sequence[Listed]) -> None:
         """Look at these trials, in this order, instead of those asked for before."""
         with self._changed:
-            self._wanted = [t for t in trials if (t.path, t.state) not in self._known]
+            unknown = [t for t in trials if (t.path, t.state) not in self._known]
+            self._wanted = [
+                t for t in unknown if t.entry.steps <= MAX_STEPS or cache_path(t.path).is_file()
+            ]
             if self._wanted and self._thread is None and not self._closing:
                 self._thread = threading.Thread(target=self._run, name="glances", daemon=True)
                 self._thread.start()
@@ -61,6 +74,9 @@ class Glances:
         with self._changed:
             self._closing = True
             self._changed.notify()
+            if self._job is not None:
+                self._job.cancelled = True
+                kill(self._job)
         if self._thread is not None:
             self._thread.join(5.0)
 
@@ -72,21 +88,41 @@ class Glances:
                 if self._closing:
                     return
                 listed = self._wanted.pop(0)
-            glance = None
             try:
-                glance = look_at(listed.path)
+                glance = self._look_at(listed.path)
             except Exception:  # a cache may hold anything; the list does without its picture
                 logger.exception("no glance at %s", listed.path)
+                glance = None
             with self._changed:
                 self._known[listed.path, listed.state] = glance
                 if len(self._known) > MAX_KEPT:
                     self._known.popitem(last=False)
 
+    def _look_at(self, path: Path) -> Glance | None:
+        log = load_cache(path, _COLUMNS)
+        if log is not None:
+            return glance_of(log)
+        job = Job("app.review.glance:glance_job", {"path": str(path)})
+        with self._changed:
+            self._job, job.cancelled = job, self._closing
+        run(job)
+        if job.result is not None:
+            return msgspec.json.decode(job.result.content, type=Glance | None)
+        if not job.cancelled:
+            logger.warning("no glance at %s: %s", path, job.error)
+        return None
 
-def look_at(path: Path) -> Glance | None:
-    """The glance at a finished trial; None where its cache has not been made yet."""
-    log = load_cache(path, _COLUMNS)
-    if log is None or log.n_steps == 0:
+
+def glance_job(path: str, progress: Progress) -> Result:
+    """The glance at a trial without a cache, which is made; runs as a job."""
+    os.nice(POLITENESS)
+    glance = glance_of(open_trial(Path(path), progress))
+    return Result(msgspec.json.encode(glance), "application/json")
+
+
+def glance_of(log: TrialLog) -> Glance | None:
+    """The glance at a trial's steps; None where it has none."""
+    if log.n_steps == 0:
         return None
     measures = compute_measures(log.steps, true_goal=None, dt=log.header.control_dt_s)
     over = log.steps["hand_position_m"][:, :2]

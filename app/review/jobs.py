@@ -107,7 +107,7 @@ class Jobs:
         """End a job that nobody waits for any more; raises as `find`."""
         job = self.find(job_id)
         job.cancelled = True
-        _kill(job)
+        kill(job)
 
     async def close(self) -> None:
         """End all jobs."""
@@ -121,7 +121,7 @@ class Jobs:
         try:
             async with self._places:
                 if not job.cancelled:
-                    await asyncio.to_thread(_watch, job)
+                    await asyncio.to_thread(run, job)
         except (OSError, EOFError) as error:
             job.error = f"the computation could not be started: {error}"
         finally:
@@ -135,8 +135,8 @@ class Jobs:
             del self._jobs[job_id]
 
 
-def _watch(job: Job) -> None:
-    """Run the job's process to its end; in a thread of the web process."""
+def run(job: Job) -> None:
+    """Run a job's process to its end; in a thread of the web process."""
     context = multiprocessing.get_context("forkserver")
     ours, theirs = context.Pipe(duplex=False)
     process = context.Process(target=_run, args=(job.entry, job.arguments, theirs), daemon=True)
@@ -144,7 +144,7 @@ def _watch(job: Job) -> None:
     job.process = process
     theirs.close()
     if job.cancelled:  # while it started
-        _kill(job)
+        kill(job)
     try:
         while True:
             kind, value = ours.recv()
@@ -166,7 +166,8 @@ def _watch(job: Job) -> None:
         job.process = None
 
 
-def _kill(job: Job) -> None:
+def kill(job: Job) -> None:
+    """End a job's process if it runs; from any thread."""
     process = job.process
     if process is not None:
         with contextlib.suppress(ValueError):  # it has ended and was closed meanwhile

@@ -86,12 +86,15 @@ export function createShare(page) {
   const link = async () => {
     const wish = new URLSearchParams({ trial: page.trial.meta.id, t: page.player.seconds.toFixed(2) });
     const url = `${location.origin}/review#${wish}`;
+    field.hidden = false;
     field.value = url;
     field.select();
-    await navigator.clipboard?.writeText(url).then(() => tell("Copied."), () => tell("Copy the link above."));
+    // A page that did not come over TLS or from this machine has no clipboard.
+    const copied = navigator.clipboard?.writeText(url) ?? Promise.reject(new Error());
+    await copied.then(() => tell("Copied."), () => tell("Copy the link above."));
   };
 
-  const field = /** @type {HTMLInputElement} */ (h("input", { type: "text", readonly: true, "aria-label": "Link to this moment", dataset: { testid: "share-url" } }));
+  const field = /** @type {HTMLInputElement} */ (h("input", { type: "text", readonly: true, hidden: true, "aria-label": "Link to this moment", dataset: { testid: "share-url" } }));
   const button = (label, id, act) => h("button", { type: "button", class: "btn line small", dataset: { testid: id }, on: { click: guarded(act) } }, label);
   byId("share").append(
     h("h2", {}, "Share"),

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+import time
 from pathlib import Path
 
 import httpx
@@ -14,6 +15,7 @@ from app.recording.container import TrialEncoder
 from app.recording.entry import index_of
 from app.recording.log_file import iter_steps
 from app.recording.reader import read_trial
+from app.recording.store import entry_of
 from app.review.notes import notes_path
 from app.review.packing import MAX_POINTS, unpack
 from app.review.secret import Password, write_password
@@ -64,6 +66,24 @@ def test_a_new_trial_appears_and_its_picture_follows(copied: Logs, review_of: St
     assert row["path"][:2] == pytest.approx(hand[0, :2], abs=1e-3)
     assert row["path"][-2:] == pytest.approx(hand[-1, :2], abs=1e-3)
     assert 0.0 <= row["opposed"] <= 1.0
+
+
+def test_pictures_do_not_need_a_cache(copied: Logs, review_of: StartReview, monkeypatch):
+    """Where it is missing it is made in passing, but for a log that takes long to read."""
+    steps = {name: entry_of(copied.path(name)).steps for name in (copied.glass, copied.block)}
+    assert steps[copied.block] < steps[copied.glass]
+    monkeypatch.setattr("app.review.glance.MAX_STEPS", steps[copied.block])
+    caches = {name: cache_path(copied.path(name)) for name in steps}
+    for cache in caches.values():
+        cache.unlink()
+    review = review_of(copied.root)
+    while review.trials()[copied.block]["path"] is None:
+        time.sleep(0.05)
+    assert review.trials()[copied.glass]["path"] is None
+    assert {name: cache.is_file() for name, cache in caches.items()} == {
+        copied.glass: False,
+        copied.block: True,
+    }
 
 
 def test_an_unfinished_log_is_listed_and_cannot_be_opened(copied: Logs, review_of: StartReview):
