@@ -21,7 +21,8 @@ class Usage:
     """What the server and all its workers use together.
 
     Attributes:
-        memory_bytes: Memory, what is shared being divided among those who share it (PSS).
+        memory_bytes: Memory that each has for itself alone (USS), summed: other programs that come
+            and go, and share libraries, do not change it.
         largest_bytes: That of the largest worker.
         cpu_s: Processor time since the start, of the processes that still run [s].
         handles: Open file handles.
@@ -98,6 +99,6 @@ def _read_address(process: psutil.Popen) -> str:
 
 def _memory(process: psutil.Process) -> int:
     try:
-        return process.memory_full_info().pss
-    except (AttributeError, psutil.AccessDenied):  # not Linux
+        return process.memory_full_info().uss
+    except psutil.AccessDenied:  # some systems tell it to nobody but the owner
         return process.memory_info().rss
