@@ -7,6 +7,7 @@ left out for size.
 
 import contextlib
 import io
+from html import escape
 from pathlib import Path
 
 from app.review.jobs import Progress, Result
@@ -17,6 +18,8 @@ from app.session.drawing import Viewer
 from app.session.view_server import view_server
 
 MAX_FRAMES = 20_000
+VISIBLE = "<style>canvas { opacity: 1 !important }</style>"
+"""viser fades its canvas in from 5 %, which stalls where few pictures are drawn."""
 LAYERS = {"slice": False, "path": True}
 
 
@@ -34,13 +37,14 @@ def share_html(
     Raises:
         ThemeError: If there is no such theme.
     """
-    dt = replay.header.control_dt_s
+    header = replay.header
+    dt = header.control_dt_s
     stride = max(1, round(1.0 / (rate_hz * dt)), -(-replay.n_steps // MAX_FRAMES))
     with view_server() as server, contextlib.redirect_stdout(io.StringIO()):
         viewer = Viewer(server, replay.scene, theme, labels=True)
         try:
             viewer.set_layers(LAYERS)
-            viewer.set_target(replay.header.instructed_goal)
+            viewer.set_target(header.instructed_goal)
             poser = ArmPoser()
             viewer.update(poser.record(replay, 0), replay.goals(0))
             serializer = server.get_scene_serializer()
@@ -48,7 +52,11 @@ def share_html(
                 viewer.update(poser.record(replay, step), replay.goals(step), None)
                 serializer.insert_sleep(stride * dt)
                 progress(0.9 * step / replay.n_steps)
-            return serializer.as_html(dark_mode=theme == "dark")
+            html = serializer.as_html(dark_mode=theme == "dark")
+            about = f"{header.instructed_goal}, {header.method}"
+            title = f"{header.participant}, trial {header.trial}: {about}"
+            html = html.replace("<title>Viser</title>", f"<title>{escape(title)}</title>", 1)
+            return html.replace("</head>", f"{VISIBLE}</head>", 1)
         finally:
             viewer.close()
 

@@ -298,6 +298,7 @@ def test_a_trial_is_shared(page: Page, logs: Logs, browser: Browser, tmp_path: P
         alone.wait_for_function(f"() => ({LINKS})().length > 50", timeout=WAIT_MS)
         first = alone.evaluate(LINKS)
         alone.wait_for_function(f"first => ({LINKS})() !== first", arg=first, timeout=WAIT_MS)
+        assert alone.evaluate("getComputedStyle(document.querySelector('canvas')).opacity") == "1"
         alone.screenshot(path=tmp_path / "alone.png")
     link = url.input_value().replace("/review#", f"/review{PLAIN}#")
     with open_page(browser, link) as there:
