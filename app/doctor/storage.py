@@ -10,8 +10,9 @@ from pathlib import Path
 
 from app.doctor.finding import Finding
 from app.recording.folders import RAW_PATTERN
+from app.recording.listing import entry_of
 from app.recording.locks import is_locked
-from app.recording.numbering import UNFINISHED
+from app.recording.numbering import FINISHED, UNFINISHED
 
 HOUR_BYTES = 200 * 10**6
 """[byte] What an hour of one session writes, logs and columns, rounded up."""
@@ -44,7 +45,7 @@ def check_storage(sessions: Path) -> Iterator[Finding]:
 
 
 def check_logs(sessions: Path) -> Finding:
-    """Logs that a killed process left, and files that were set aside as damaged."""
+    """Logs that a killed process left, that cannot be read, or that were set aside as damaged."""
     found = sorted(sessions.glob(f"*/{RAW_PATTERN}/trial-*{UNFINISHED}"))
     torn = [path for path in found if not is_locked(path)]
     aside = [p for name in _SET_ASIDE for p in sessions.glob(f"*/{RAW_PATTERN}/{name}")]
@@ -52,6 +53,12 @@ def check_logs(sessions: Path) -> Finding:
     if torn:
         text = f"{len(torn)} torn{running}, the first is {torn[0]}"
         return Finding("Logs", "warn", text, "the next `hindsight run` completes them")
+    finished = sorted(sessions.glob(f"*/{RAW_PATTERN}/trial-*{FINISHED}"))
+    problems = [entry.problem for entry in map(entry_of, finished) if entry.problem]
+    if problems:
+        text = f"{len(problems)} of {len(finished)} cannot be used{running}: {problems[0]}"
+        advice = "the others are not affected; `hindsight review` lists them all with what is wrong"
+        return Finding("Logs", "warn", text, advice)
     if aside:
         text = f"{len(aside)} damaged files were set aside{running}, the first is {aside[0]}"
         advice = "what was readable is in the trial beside it; delete the file once you have looked"

@@ -80,8 +80,8 @@ def decode_header(data: bytes) -> TrialHeader:
     version = decode(_Version, data).schema_version
     if version > SCHEMA_VERSION:
         raise NewerFormatError(
-            f"written in record format {version}; this program reads up to {SCHEMA_VERSION}: "
-            "update Hindsight"
+            f"it was written in record format {version}; this program reads up to "
+            f"{SCHEMA_VERSION}: update Hindsight"
         )
     return decode(TrialHeader, data)
 

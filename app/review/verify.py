@@ -52,7 +52,7 @@ def verify_log(path: Path, name: str, entry: TrialEntry | None = None) -> Findin
     """Re-simulate one log; what is wrong with it is the finding, never an exception."""
     entry = look_up(path) if entry is None else entry
     if entry.problem:
-        return Finding(name, "cannot try", entry.problem.replace(str(path), "it"))
+        return Finding(name, "cannot try", _of_it(entry.problem, path))
     if not path.name.endswith(FINISHED):
         return Finding(name, "cannot try", f"it is {entry.outcome}: its log is not finished")
     try:
@@ -63,12 +63,17 @@ def verify_log(path: Path, name: str, entry: TrialEntry | None = None) -> Findin
     except VerifyError as error:
         return Finding(name, "cannot try", str(error), entry.steps)
     except AppError as error:
-        return Finding(name, "cannot try", str(error).replace(str(path), "it"), entry.steps)
+        return Finding(name, "cannot try", _of_it(str(error), path), entry.steps)
     except (ValueError, IndexError) as error:  # a log whose numbers do not fit its own scene
         return Finding(name, "cannot try", f"its numbers do not fit its scene: {error}")
     if difference is None:
         return Finding(name, "identical", "", entry.steps)
     return Finding(name, "diverges", str(difference), entry.steps)
+
+
+def _of_it(error: str, path: Path) -> str:
+    """What is wrong with a log whose name stands before it anyway."""
+    return error.removeprefix(f"{path}: ").replace(str(path), "it")
 
 
 def format_finding(finding: Finding) -> str:

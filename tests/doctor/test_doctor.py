@@ -101,7 +101,11 @@ def test_torn_logs_are_counted_and_living_ones_are_not(tmp_path: Path) -> None:
     assert "1 torn, 1 being written now" in finding.text and "trial-009" in finding.text
     writer.close()
     writer.join()
-    (folder / "trial-009.mcap.part").rename(folder / "trial-009.mcap.damaged")
+    (folder / "trial-009.mcap.part").rename(folder / "trial-009.mcap")
+    finding = check_logs(tmp_path)
+    assert finding.level == "warn" and "1 of 2 cannot be used" in finding.text
+    assert "trial-009.mcap is torn" in finding.text
+    (folder / "trial-009.mcap").rename(folder / "trial-009.mcap.damaged")
     finding = check_logs(tmp_path)
     assert finding.level == "warn" and "1 damaged files were set aside" in finding.text
 
