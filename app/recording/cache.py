@@ -8,9 +8,10 @@ Besides the steps it holds header, events and summary, so that nothing else need
 import contextlib
 import os
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import msgspec
 import numpy as np
@@ -20,12 +21,14 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from app.recording.arrow import from_table, to_table
-from app.recording.columns import STEP_TYPES, Column, TrialLog, no_pause
-from app.recording.log_file import read_log, state_of
+from app.recording.columns import STEP_TYPES, Column, Columns, TrialLog, no_pause, to_columns
+from app.recording.log_file import Reading, naming, read_log, state_of
 from app.recording.numbering import CACHE
-from app.recording.schema import TrialEvent, TrialHeader, TrialSummary
+from app.recording.schema import StepRecord, TrialEvent, TrialHeader, TrialSummary
 
 CACHE_VERSION = 1
+GROUP_STEPS = 3000
+"""[step] Derived and written at once: half a minute of a trial, 5 MB."""
 _KEY = b"hindsight"
 
 
@@ -50,8 +53,17 @@ def cache_path(log: Path) -> Path:
 
 
 def derive_cache(log: Path, pause: Callable[[], None] = no_pause) -> None:
-    """Derive the cache of a finished log; arguments and errors as `read_log`, `write_cache`."""
-    write_cache(read_log(log, pause))
+    """Derive the cache of a finished log, a group of steps after another.
+
+    A long trial so takes no more memory than a short one. Arguments and errors as `read_log`;
+    OSError if the cache cannot be written.
+    """
+    reading = Reading(log)
+    try:
+        with naming(log):
+            _write(reading, _groups(reading.steps(), pause))
+    except _WidthError:
+        write_cache(read_log(log, pause))
 
 
 def write_cache(trial: TrialLog) -> None:
@@ -60,31 +72,68 @@ def write_cache(trial: TrialLog) -> None:
     Raises:
         OSError: If the cache cannot be written.
     """
-    size, changed_ns = trial.log_state
-    about = _About(
-        version=CACHE_VERSION,
-        log_size=size,
-        log_changed_ns=changed_ns,
-        columns={name: column.dtype.str for name, column in trial.steps.items()},
-        widths={n: column.shape[1] for n, column in trial.steps.items() if column.ndim == 2},
-        header=trial.header,
-        events=list(trial.events),
-        summary=trial.summary,
-    )
-    stored = {_KEY: msgspec.msgpack.encode(about)}
-    _write_table(to_table(trial.steps, stored), cache_path(trial.path))
+    _write(trial, iter([trial.steps]))
 
 
-def _write_table(table: pa.Table, path: Path) -> None:
+class _WidthError(Exception):
+    """A list has another length than in the groups before."""
+
+
+def _groups(steps: Iterator[StepRecord], pause: Callable[[], None]) -> Iterator[Columns]:
+    """Columns of so many steps at a time; one group without steps where there are none."""
+    group = to_columns(islice(steps, GROUP_STEPS), pause)
+    yield group
+    while len(group["step"]) == GROUP_STEPS:
+        group = to_columns(islice(steps, GROUP_STEPS), pause)
+        if len(group["step"]):
+            yield group
+
+
+def _write(source: TrialLog | Reading, groups: Iterator[Columns]) -> None:
+    """Write the groups and then what the source knows once they have passed."""
+    with _replacing(cache_path(source.path)) as file, contextlib.ExitStack() as stack:
+        first = next(groups)
+        types = {name: column.dtype for name, column in first.items()}
+        widths = _widths(first)
+        table = to_table(first)
+        # Measured numbers hardly repeat: a dictionary of them costs more than it saves.
+        text: Any = [f.name for f in table.schema if pa.types.is_dictionary(f.type)]
+        writer = stack.enter_context(
+            pq.ParquetWriter(
+                file, table.schema, compression="zstd", use_dictionary=text, write_statistics=False
+            )
+        )
+        writer.write_table(table)
+        for group in groups:
+            if _widths(group) != widths:
+                raise _WidthError
+            types = {name: np.promote_types(types[name], c.dtype) for name, c in group.items()}
+            writer.write_table(to_table(group))
+        size, changed_ns = source.log_state
+        about = _About(
+            version=CACHE_VERSION,
+            log_size=size,
+            log_changed_ns=changed_ns,
+            columns={name: kind.str for name, kind in types.items()},
+            widths=widths,
+            header=source.header,
+            events=list(source.events),
+            summary=source.summary,
+        )
+        writer.add_key_value_metadata({_KEY: msgspec.msgpack.encode(about)})
+
+
+def _widths(columns: Columns) -> dict[str, int]:
+    return {name: column.shape[1] for name, column in columns.items() if column.ndim == 2}
+
+
+@contextlib.contextmanager
+def _replacing(path: Path) -> Iterator[BinaryIO]:
     """Write beside the target, then rename: a reader meets the old cache or the new one."""
     fd, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     try:
         with os.fdopen(fd, "wb") as file:
-            # Measured numbers hardly repeat: a dictionary of them costs more than it saves.
-            text: Any = [f.name for f in table.schema if pa.types.is_dictionary(f.type)]
-            pq.write_table(
-                table, file, compression="zstd", use_dictionary=text, write_statistics=False
-            )
+            yield file
         os.chmod(name, 0o644)
         os.replace(name, path)
     except BaseException:
@@ -103,7 +152,7 @@ def load_cache(log: Path, columns: Sequence[str] | None = None) -> TrialLog | No
     try:
         log_state = state_of(log)
         with pq.ParquetFile(cache_path(log)) as file:
-            stored = (file.schema_arrow.metadata or {}).get(_KEY)
+            stored = (file.metadata.metadata or {}).get(_KEY)
             if stored is None:
                 return None
             about = msgspec.msgpack.decode(stored, type=_About)

@@ -20,6 +20,45 @@ def unfinished(path: Path, head: bytes) -> str:
     return f"{path} is torn: its recording did not finish, or part of it is missing"
 
 
+class Reading:
+    """A finished log being read: its steps one after another, and then all else that is in it.
+
+    Attributes:
+        path: The log.
+        log_state: Its size [byte] and time of change [ns] before it was read.
+        events: Those met so far.
+        summary: How the trial ended, once met.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Look at the file; raises RecordingError where that is refused."""
+        self.path = path
+        with readable(path):
+            self.log_state = state_of(path)  # before reading: a later change makes a cache stale
+        self.events: list[TrialEvent] = []
+        self.summary: TrialSummary | None = None
+        self._header: TrialHeader | None = None
+
+    @property
+    def header(self) -> TrialHeader:
+        """What was fixed before the first step; raises RecordingError where there was none."""
+        if self._header is None:
+            raise RecordingError(f"{self.path} is an MCAP file without a Hindsight trial")
+        return self._header
+
+    def steps(self) -> Iterator[StepRecord]:
+        """The steps, once; raises RecordingError and MessageError where the damage is met."""
+        for record, data in _messages(self.path):
+            if record == "step":
+                yield decode(StepRecord, data)
+            elif record == "trial":
+                self._header = self._header or decode_header(data)
+            elif record == "event":
+                self.events.append(decode(TrialEvent, data))
+            else:
+                self.summary = decode(TrialSummary, data)
+
+
 def read_log(path: Path, pause: Callable[[], None] = no_pause) -> TrialLog:
     """The whole trial from its MCAP file.
 
@@ -30,34 +69,16 @@ def read_log(path: Path, pause: Callable[[], None] = no_pause) -> TrialLog:
     Raises:
         RecordingError: If the file is missing, empty, torn, damaged, foreign or of a newer format.
     """
-    header: list[TrialHeader] = []
-    events: list[TrialEvent] = []
-    summaries: list[TrialSummary] = []
-
-    def steps() -> Iterator[StepRecord]:
-        for record, data in _messages(path):
-            if record == "step":
-                yield decode(StepRecord, data)
-            elif record == "trial":
-                header.append(decode_header(data))
-            elif record == "event":
-                events.append(decode(TrialEvent, data))
-            else:
-                summaries.append(decode(TrialSummary, data))
-
-    with readable(path):
-        log_state = state_of(path)  # before reading: a later change makes a cache stale
+    reading = Reading(path)
     with naming(path):
-        columns = to_columns(steps(), pause)
-    if not header:
-        raise RecordingError(f"{path} is an MCAP file without a Hindsight trial")
+        columns = to_columns(reading.steps(), pause)
     return TrialLog(
         path=path,
-        log_state=log_state,
-        header=header[0],
+        log_state=reading.log_state,
+        header=reading.header,
         steps=columns,
-        events=tuple(events),
-        summary=summaries[-1] if summaries else None,
+        events=tuple(reading.events),
+        summary=reading.summary,
     )
 
 

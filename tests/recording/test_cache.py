@@ -107,6 +107,28 @@ def test_lists_that_are_empty_or_vary_keep_their_rows(tmp_path: Path) -> None:
         np.testing.assert_array_equal(steps["best_targets"], [[0, 1], [0, -1], [-1, -1]])
 
 
+@pytest.mark.parametrize("row", [[3.0, 4.0], [3.0], [3.0, 4.0, 5.0]])
+def test_a_long_trial_is_derived_in_groups(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, row: list[float]
+) -> None:
+    """The same as in one piece, also where words grow or a list has another length later on."""
+    monkeypatch.setattr("app.recording.cache.GROUP_STEPS", 4)
+    writer = TrialWriter(tmp_path, make_header())
+    for number in range(10):
+        late = number > 6
+        values, device = (row, "a longer word") if late else ([1.0, 2.0], "none")
+        writer.write(make_step(number, values=values, device=device))
+    path = writer.close(make_summary())
+    writer.join()
+    assert path is not None
+    cached, log = load_cache(path), read_log(path)
+    assert cached is not None and cached.summary == log.summary and cached.header == log.header
+    assert same_columns(cached.steps, log.steps)
+    assert [c.dtype for c in cached.steps.values()] == [c.dtype for c in log.steps.values()]
+    groups = pq.ParquetFile(cache_path(path)).num_row_groups
+    assert groups == (3 if len(row) == 2 else 1)
+
+
 def test_deriving_and_loading_a_cache_never_imports_pandas(record: Callable[..., Path]) -> None:
     """Its import would stop a control loop in the same process for a second."""
     path = record()
