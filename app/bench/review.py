@@ -70,11 +70,10 @@ def bench_review(
         _tell(f"recording a trial of {minutes:g} minutes …")
         log = record_long(Path(root), round(6000 * minutes))
         fresh, *trials = _repeat(log, n_trials + 1)
-        cache_path(fresh).unlink()
         command = ["review", root, "--port", "0"]
         with running(command) as server:
             ids = [path.relative_to(root).as_posix() for path in (log, fresh, *trials)]
-            figures = _measure(server, *ids)
+            figures = _measure(server, Path(root), *ids)
             return figures | bench_page(server.url, ids[2:], n_scrubs)
 
 
@@ -121,10 +120,11 @@ def _repeat(log: Path, count: int) -> list[Path]:
     return paths
 
 
-def _measure(server: Served, first: str, fresh: str, *trials: str) -> Figures:
+def _measure(server: Served, root: Path, first: str, fresh: str, *trials: str) -> Figures:
     with _Page(server.url) as page:
-        page.wait_for_pictures(2 + len(trials) - 1)
+        page.wait_for_pictures(2 + len(trials))
         page.open(first)  # the worker draws its first scene
+        cache_path(root / fresh).unlink()  # only now, or the list's pictures would make it anew
         _tell("opening a trial without its cache …")
         first_open_s, reports = page.open(fresh)
         opened, memory = [], []
