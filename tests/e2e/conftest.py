@@ -1,4 +1,4 @@
-"""One running server and one browser for the end-to-end tests."""
+"""A running server for each end-to-end test, and one browser for all."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -18,10 +18,14 @@ Navigator.prototype.getGamepads = () => [null, window.pad];
 """
 
 
-@pytest.fixture(scope="module")
-def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    """`hindsight run` with an empty folder of sessions."""
-    with running_server(tmp_path_factory.mktemp("server")) as running:
+@pytest.fixture
+def server(tmp_path: Path) -> Iterator[Server]:
+    """`hindsight run` with an empty folder of sessions.
+
+    One for each test: sessions that a page has left live on for a minute, and several of them
+    beside a browser that draws in software slow the one under test.
+    """
+    with running_server(tmp_path) as running:
         yield running
 
 

@@ -53,7 +53,6 @@ def test_the_sticks_grasp(server: Server, browser: Browser, method: str, target:
 def test_a_gamepad_grasps(server: Server, browser: Browser):
     """A pad with the standard mapping, plugged in after the page has opened, does it too."""
     with open_page(browser, f"{server.url}/?method=policy&target=glass&seed=5") as page:
-        start(page, "glass")  # a page that waited for a place has loaded anew by now
         page.evaluate(GAMEPAD)
         page.evaluate("dispatchEvent(new Event('gamepadconnected'))")
         assert grasp(page, "glass", "gamepad") == "grasped"
