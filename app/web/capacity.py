@@ -12,7 +12,7 @@ from app.robot.target_cache import cache_folder
 
 SESSIONS_PER_CORE = 2.0
 """Two cores keep all ticks of three sessions with a moving arm, a viewer and a recorded log each,
-and 98 to 99.6 % of four beside visitors that use the same cores. See `hindsight bench capacity`."""
+and 91 to 99.6 % of four beside visitors that use the same cores. See `hindsight bench capacity`."""
 SESSION_BYTES = 250 * 2**20
 """[byte] A worker with its viewer and the log that a full disk keeps waiting, generously."""
 RESERVED_BYTES = 2**30
