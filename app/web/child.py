@@ -3,6 +3,7 @@
 Imported by the forkserver's children, so it imports next to nothing.
 """
 
+import ctypes
 import importlib
 import select
 import signal
@@ -14,6 +15,9 @@ from typing import Any
 HEARTBEAT_S = 4.0
 DEAD_MAN_S = 20.0
 """The kernel ends a worker this long after the web process vanished, or after it hung [s]."""
+M_MMAP_THRESHOLD = -3
+"""glibc's number of the parameter."""
+LARGE_BLOCK_BYTES = 128 * 1024
 
 
 def run_worker(entry: str, spec: Any, sock: socket.socket) -> None:
@@ -25,6 +29,7 @@ def run_worker(entry: str, spec: Any, sock: socket.socket) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     _offer_to_the_oom_killer()
     _arm_dead_man_switch(sock)
+    _give_back_large_blocks()
     module, _, function = entry.partition(":")
     getattr(importlib.import_module(module), function)(spec, sock)
 
@@ -35,6 +40,18 @@ def _offer_to_the_oom_killer() -> None:
         Path("/proc/self/oom_score_adj").write_text("500")
     except OSError:
         pass  # not Linux, or a container that forbids it
+
+
+def _give_back_large_blocks() -> None:
+    """Map blocks of 128 KiB and more singly, so that what is freed of them leaves the process.
+
+    glibc raises this bound by itself at the first large block that is freed. From then on viser's
+    socket, which reads into 256 KiB and keeps a few hundred bytes of it, and every trial's columns
+    are cut out of the heap, which grows by the holes.
+    """
+    mallopt = getattr(ctypes.CDLL(None), "mallopt", None)  # only glibc has it
+    if mallopt is not None:
+        mallopt(M_MMAP_THRESHOLD, LARGE_BLOCK_BYTES)
 
 
 def _arm_dead_man_switch(sock: socket.socket) -> None:

@@ -114,6 +114,9 @@ class HindsightServer(uvicorn.Server):
                 access_log=False,  # addresses of participants do not belong in logs
                 log_level="warning",
                 log_config=None,
+                # uvloop, where there is one. asyncio's own loop reads every message into a block of
+                # 256 KiB and shrinks it: that leaves holes, and the heap grows for hours.
+                loop="auto",
                 server_header=False,
                 proxy_headers=config.behind_tls_proxy,
                 ws="websockets-sansio",
