@@ -5,6 +5,7 @@ Rooms are imported by the command that needs them, so that `hindsight --help` an
 
 import argparse
 import json
+import signal
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -320,6 +321,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     if not arguments or (arguments[0].startswith("-") and arguments[0] not in _OWN_OPTIONS):
         arguments.insert(0, DEFAULT_COMMAND)
     args = build_parser().parse_args(arguments)
+    # Told to end, a command ends what it started, as after Ctrl+C; servers have an order of theirs.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         return args.run(args) or 0
     except AppError as error:

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from typing import IO, Any
 
 import msgspec
-from mcap.records import Channel, Footer, Message
+from mcap.records import Channel, Footer, Message, Statistics
 from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 
@@ -104,15 +104,17 @@ def to_ns(wall_s: float) -> int:
 def scan(file: IO[bytes]) -> Iterator[tuple[str, int, int, bytes]]:
     """Messages of an MCAP file in the order written: record name, log time [ns], number, JSON.
 
-    Checksums are verified chunk by chunk. Reaching the end without an exception means the file is
-    whole; a torn or damaged one raises whatever mcap meets at the damage, after all that precedes.
-    Other programs' topics are passed over.
+    Checksums are verified chunk by chunk, and at the end the count: a hole of zeros reads like
+    nothing at all. Reaching the end without an exception means the file is whole; a torn or damaged
+    one raises whatever mcap meets at the damage, after all that precedes. Other programs' topics
+    are passed over.
     """
     names: dict[int, str] = {}
-    ended = False
+    ended, count = False, 0
     reader = StreamReader(file, validate_crcs=True, record_size_limit=RECORD_SIZE_LIMIT)
     for entry in reader.records:
         if isinstance(entry, Message):
+            count += 1
             record = names.get(entry.channel_id)
             if record is not None:
                 yield record, entry.log_time, entry.sequence, entry.data
@@ -120,6 +122,8 @@ def scan(file: IO[bytes]) -> Iterator[tuple[str, int, int, bytes]]:
             topic = entry.topic.removeprefix("/")
             if topic in RECORDS and entry.message_encoding == "json":
                 names[entry.id] = topic
+        elif isinstance(entry, Statistics) and entry.message_count != count:
+            raise EOFError(f"{entry.message_count - count} messages are missing")
         ended = isinstance(entry, Footer)
     if not ended:
         raise EOFError("the file has no end")

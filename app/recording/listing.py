@@ -50,11 +50,16 @@ def _logs(base: Path, study: str | None) -> Iterator[Path]:
 
 
 def entry_of(path: Path) -> TrialEntry:
-    """The entry of one log, finished or not; never raises for what is in the file."""
+    """The entry of one log, finished or not; never raises for what is in the file.
+
+    A log whose header a newer program wrote has a problem, however well its index reads: its steps
+    need not.
+    """
     try:
-        if path.name.endswith(FINISHED):
-            return read_entry(path)
         header = read_header(path)
+        if path.name.endswith(FINISHED):
+            entry = read_entry(path)
+            return entry if header else _unusable(path, f"{path} holds no trial")
     except RecordingError as error:
         return _unusable(path, str(error))
     if header is None:

@@ -14,9 +14,10 @@ from starlette.routing import Route
 from app.errors import AppError
 from app.recording.cache import load_cache
 from app.recording.errors import RecordingError
+from app.recording.listing import entry_of
 from app.recording.numbering import FINISHED
 from app.review.errors import ConflictError, MissingError, OutsideError, ReviewError
-from app.review.folder import Listed, ReviewFolder, look_up
+from app.review.folder import Listed, ReviewFolder
 from app.review.gate import Gate
 from app.review.glance import Glances
 from app.review.jobs import Job, Jobs
@@ -137,7 +138,7 @@ class Api:
         key = (trial_id, (stat.st_size, stat.st_mtime_ns))
         known = self._open.get(key)
         if known is None:
-            entry = look_up(path)
+            entry = entry_of(path)
             if entry.problem:
                 raise RecordingError(entry.problem)
             log = load_cache(path, COLUMNS)

@@ -8,11 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-import msgspec
-
-from app.recording.errors import RecordingError
 from app.recording.folders import PRIVATE
-from app.recording.listing import read_header
 from app.recording.numbering import FINISHED, UNFINISHED
 from app.recording.store import TrialEntry, entry_of
 from app.review.errors import MissingError, OutsideError, ReviewError
@@ -72,7 +68,7 @@ class ReviewFolder:
             if before is not None and before.state == state and path.name.endswith(FINISHED):
                 known[path] = before
             else:
-                known[path] = Listed(self.id_of(path), path, state, look_up(path))
+                known[path] = Listed(self.id_of(path), path, state, entry_of(path))
         self._known = known
         return sorted(known.values(), key=_order)
 
@@ -118,23 +114,6 @@ class ReviewFolder:
                     path = Path(folder) / name
                     if not path.is_symlink():
                         yield path
-
-
-def look_up(path: Path) -> TrialEntry:
-    """The entry of a log, with its problem also where only its header tells it.
-
-    The index of a newer program's log may read well; its steps need not.
-    """
-    entry = entry_of(path)
-    if entry.problem or not path.name.endswith(FINISHED):
-        return entry
-    try:
-        header = read_header(path)
-    except RecordingError as error:
-        return msgspec.structs.replace(entry, problem=str(error))
-    if header is None:
-        return msgspec.structs.replace(entry, problem=f"{path} holds no trial")
-    return entry
 
 
 def _order(listed: Listed) -> tuple[str, str, str, int, str]:

@@ -7,11 +7,11 @@ from typing import Literal
 
 from app.errors import AppError
 from app.recording.entry import TrialEntry
-from app.recording.listing import read_header
+from app.recording.listing import entry_of, read_header
 from app.recording.log_file import iter_steps
 from app.recording.numbering import FINISHED
 from app.review.errors import ReviewError
-from app.review.folder import ReviewFolder, look_up
+from app.review.folder import ReviewFolder
 from app.session.verify import VerifyError, resimulate
 
 Verdict = Literal["identical", "diverges", "cannot try"]
@@ -50,7 +50,7 @@ def verify(target: Path) -> Iterator[Finding]:
 
 def verify_log(path: Path, name: str, entry: TrialEntry | None = None) -> Finding:
     """Re-simulate one log; what is wrong with it is the finding, never an exception."""
-    entry = look_up(path) if entry is None else entry
+    entry = entry_of(path) if entry is None else entry
     if entry.problem:
         return Finding(name, "cannot try", _of_it(entry.problem, path))
     if not path.name.endswith(FINISHED):

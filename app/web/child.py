@@ -15,8 +15,8 @@ from typing import Any
 HEARTBEAT_S = 4.0
 DEAD_MAN_S = 20.0
 """The kernel ends a worker this long after the web process vanished, or after it hung [s]."""
-M_MMAP_THRESHOLD = -3
-"""glibc's number of the parameter."""
+M_MMAP_THRESHOLD, M_ARENA_MAX = -3, -8
+"""glibc's numbers of the parameters."""
 LARGE_BLOCK_BYTES = 128 * 1024
 
 
@@ -27,11 +27,25 @@ def run_worker(entry: str, spec: Any, sock: socket.socket) -> None:
     a worker ignores it.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    _keep_the_heap_whole()
     _offer_to_the_oom_killer()
     _arm_dead_man_switch(sock)
-    _give_back_large_blocks()
     module, _, function = entry.partition(":")
     getattr(importlib.import_module(module), function)(spec, sock)
+
+
+def _keep_the_heap_whole() -> None:
+    """One heap for all threads, and blocks of 128 KiB and more mapped singly; before any thread.
+
+    glibc raises that bound by itself at the first large block that is freed. From then on viser's
+    socket, which reads into 256 KiB and keeps a few hundred bytes of it, and every trial's columns
+    are cut out of the heap, which grows by the holes. And each trial's writer is a thread that may
+    be given another heap, each of which grows to what the largest trial needed.
+    """
+    mallopt = getattr(ctypes.CDLL(None), "mallopt", None)  # only glibc has it
+    if mallopt is not None:
+        mallopt(M_MMAP_THRESHOLD, LARGE_BLOCK_BYTES)
+        mallopt(M_ARENA_MAX, 1)
 
 
 def _offer_to_the_oom_killer() -> None:
@@ -40,18 +54,6 @@ def _offer_to_the_oom_killer() -> None:
         Path("/proc/self/oom_score_adj").write_text("500")
     except OSError:
         pass  # not Linux, or a container that forbids it
-
-
-def _give_back_large_blocks() -> None:
-    """Map blocks of 128 KiB and more singly, so that what is freed of them leaves the process.
-
-    glibc raises this bound by itself at the first large block that is freed. From then on viser's
-    socket, which reads into 256 KiB and keeps a few hundred bytes of it, and every trial's columns
-    are cut out of the heap, which grows by the holes.
-    """
-    mallopt = getattr(ctypes.CDLL(None), "mallopt", None)  # only glibc has it
-    if mallopt is not None:
-        mallopt(M_MMAP_THRESHOLD, LARGE_BLOCK_BYTES)
 
 
 def _arm_dead_man_switch(sock: socket.socket) -> None:

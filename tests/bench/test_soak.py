@@ -1,5 +1,10 @@
 """The benches of whole servers, at their shortest: real workers, real viewers, real logs."""
 
+import signal
+import subprocess
+import sys
+
+import psutil
 import pytest
 
 from app.bench.capacity import bench_capacity
@@ -27,3 +32,21 @@ def test_a_short_soak_stays_flat() -> None:
     assert figures["handles"]["last"] <= figures["handles"]["first"] + 8
     assert figures["clock"]["most"] <= 10.0  # [ms]: one slot
     assert figures["status"]["mean"] > 1.0
+
+
+def test_a_bench_that_is_told_to_end_takes_its_server_along() -> None:
+    """SIGTERM in mid-run: neither the server nor a worker is left."""
+    command = [sys.executable, "-u", "-m", "app", "bench", "soak", "--sessions", "1"]
+    process = psutil.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    try:
+        assert "processes" in process.stderr.readline()
+        started = process.children(recursive=True)
+        assert len(started) >= 3  # the server, its forkserver, a worker
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(90) == 130
+        _, left = psutil.wait_procs(started, timeout=30)
+        assert not left
+    finally:
+        if process.is_running():
+            process.kill()
+        process.stderr.close()

@@ -13,10 +13,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.recording.entry import read_entry
+from app.recording.container import TrialEncoder
+from app.recording.entry import index_of, read_entry
 from app.recording.errors import RecordingError
 from app.recording.folders import EVENTS_FILE
 from app.recording.reader import read_steps, read_trial
+from app.recording.schema import StepRecord
 from app.recording.store import (
     append_event,
     entry_of,
@@ -180,15 +182,26 @@ def test_a_list_shows_every_trial_whatever_its_state(
     assert json.loads(trials_to_json(entries))[1]["outcome"] == "grasped"
 
 
-def test_a_list_does_not_read_the_steps(tmp_path: Path, record: Callable[..., Path]) -> None:
-    """With all steps blanked out, the entry still reads: it comes from the end of the file."""
-    path = record(open_session(tmp_path, "demo", "p0001", "s1"))
+def test_a_list_does_not_read_the_steps(tmp_path: Path, steps: list[StepRecord]) -> None:
+    """With all steps blanked out, the entry still reads: it comes from both ends of the file."""
+    path = open_session(tmp_path, "demo", "p0001", "s1") / "trial-001.mcap"
+    header = make_header()
+    encoder = TrialEncoder()
+    encoder.add("trial", header, 0, 0)
+    encoder.flush()
+    begin = len(encoder.buffer.waiting)
+    for number, step in enumerate(steps):
+        encoder.add("step", step, 0, number)
+    encoder.flush()
+    end = len(encoder.buffer.waiting)
+    encoder.finish(index_of(header, make_summary(steps=len(steps))))
+    content = bytes(encoder.buffer.waiting)
+    path.write_bytes(content)
+    assert len(read_steps(path)) == len(steps)
     entry = read_entry(path)
-    content = path.read_bytes()
-    at = content.index(b"attempt" + (1).to_bytes(4, "little") + b"1")
-    assert at > 10_000
-    path.write_bytes(b"\0" * (at // 2) + content[at // 2 :])
+    path.write_bytes(content[:begin] + b"\0" * (end - begin) + content[end:])
     assert list_trials(tmp_path) == [entry]
+    assert not entry.problem
     with pytest.raises(RecordingError):
         read_steps(path)
 
