@@ -18,7 +18,7 @@ def complete_logs(sessions: Path) -> int:
 
 
 def complete_session(spec: WorkerSpec) -> int:
-    """The same for one session whose worker died; returns how many."""
+    """The same for one session whose worker is gone; returns how many."""
     participant = spec.participant or spec.id
     folder = session_folder(Path(spec.sessions), spec.study, participant, spec.session)
     return _report(recover_folder(folder))

@@ -94,13 +94,12 @@ class SessionRegistry:
 
         def gone(worker: Worker, ending: Ending) -> None:
             session.worker_gone(worker, ending)
-            if ending.cause in ("crashed", "hung"):
-                self._complete_log(spec)
+            self._complete_log(spec)  # one that could say goodbye may have lacked memory for it
 
         session.attach(self.workers.start(spec, session.receive, gone))
 
     def _complete_log(self, spec: WorkerSpec) -> None:
-        """Finish what a dead worker wrote, beside the event loop."""
+        """Finish what a worker left unfinished, beside the event loop."""
         task = asyncio.create_task(asyncio.to_thread(complete_session, spec))
         self._chores.add(task)
         task.add_done_callback(self._chores.discard)

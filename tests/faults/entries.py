@@ -18,6 +18,7 @@ from typing import Any
 import psutil
 import viser
 
+from app.recording.container import TrialEncoder
 from app.recording.sink import FileSink
 from app.session import worker
 from app.session.spec import WorkerSpec
@@ -85,13 +86,17 @@ def _break_disk(switch: _Switch) -> None:
 
 
 def _break_memory(switch: _Switch) -> None:
-    """No more memory than is in use now, and a tick that asks for some."""
+    """No more memory than is in use now, a tick that asks for some, and none to compress a log."""
     real = Trial.step
+
+    def flush(self: TrialEncoder) -> None:
+        raise MemoryError
 
     def step(self: Trial, *args: Any, **options: Any) -> Any:
         if "memory" in switch.on:
             hard = resource.getrlimit(resource.RLIMIT_AS)[1]
             resource.setrlimit(resource.RLIMIT_AS, (psutil.Process().memory_info().vms, hard))
+            TrialEncoder.flush = flush
             self.ballast = bytearray(1 << 30)  # type: ignore[attr-defined]
         return real(self, *args, **options)
 
